@@ -1,4 +1,4 @@
-/* A comparison: the mean curvature of the plate along u, where it was seen.
+/* Example of a comparison: the mean curvature of the plate along u, over the part that was seen.
  *
  * cc -std=c11 -O2 -shared -fPIC -fvisibility=hidden -I. -o libmy_plugin.so comparison.c -lm */
 #include "platen_surface.h"

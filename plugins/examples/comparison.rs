@@ -1,4 +1,4 @@
-//! A comparison: the mean curvature of the plate along u, where it was seen.
+//! Example of a comparison: the mean curvature of the plate along u, over the part that was seen.
 
 use platen_sdk::{
     Comparison, Error, ErrorKind, Figure, Findings, Info, Inputs, Job, PlateGrid, Report, Result, options,

@@ -1,4 +1,4 @@
-/* A flattening: the harmonic map, right on plates that were bent without stretching.
+/* Example of a flattening: the harmonic map, which is correct on plates that were bent without stretching.
  *
  * cc -std=c11 -O2 -shared -fPIC -fvisibility=hidden -I. -o libmy_plugin.so flattening.c -lm */
 #include "harmonic_map.h"

@@ -1,4 +1,4 @@
-// A flattening: the harmonic map, right on plates that were bent without stretching.
+// Example of a flattening: the harmonic map, which is correct on plates that were bent without stretching.
 //
 // c++ -std=c++17 -O2 -shared -fPIC -fvisibility=hidden -I. -o libmy_plugin.so flattening.cpp
 #include "platen.hpp"

@@ -1,4 +1,4 @@
-//! A flattening: the harmonic map, right on plates that were bent without stretching.
+//! Example of a flattening: the harmonic map, which is correct on plates that were bent without stretching.
 
 use platen_sdk::{
     Chart, DiskMesh, Error, ErrorKind, Flattening, Info, Job, Result, cotangents, fixed_boundary,

@@ -1,4 +1,4 @@
-//! Time of ABF++ with layout by number of vertices: a 4 x 4 m plate rolled to R 12 m, jittered, Delaunay.
+//! Benchmark of ABF++ with layout, by number of vertices: a 4 x 4 m plate rolled to R 12 m, jittered, Delaunay.
 
 #[path = "../src/angles.rs"]
 mod angles;
@@ -19,7 +19,7 @@ fn smooth(bencher: Bencher<'_, '_>, side: u32) {
     run(bencher, side, 0.0);
 }
 
-/// 0.5 mm of noise.
+/// With 0.5 mm of noise.
 #[divan::bench(args = [32, 71, 101, 224, 316], sample_count = 15)]
 fn noisy(bencher: Bencher<'_, '_>, side: u32) {
     run(bencher, side, 5e-4);

@@ -29,8 +29,8 @@ pub(crate) fn targets(mesh: &DiskMesh, node_of: &[Option<u32>], n_inner: usize) 
     targets
 }
 
-/// Residuals of the constraints: per triangle the sum of angles less pi; per interior vertex the sum of angles less 2 pi,
-/// and the logarithm of the factor by which edge lengths grow in one turn around it.
+/// Residuals of the constraints: per triangle the sum of angles less pi; per interior vertex the sum of angles less 2
+/// pi, and the logarithm of the factor by which edge lengths grow in one turn around it.
 pub(crate) struct Residuals {
     pub(crate) triangles: Vec<f64>,
     pub(crate) vertices: Vec<[f64; 2]>,
@@ -52,8 +52,8 @@ impl Residuals {
     }
 }
 
-/// Jacobian block of a triangle in the vertex constraints: per corner, the derivatives of the turn and of the growth by the
-/// triangle's three angles.
+/// Jacobian block of a triangle in the vertex constraints: for each corner, the derivatives of the turn and of the
+/// growth by the triangle's three angles.
 #[derive(Clone, Copy)]
 pub(crate) struct Jacobian([[Corners; 2]; 3]);
 

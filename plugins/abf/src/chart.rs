@@ -10,13 +10,13 @@ use platen_shape::flatten::{fixed_boundary, interior, plane_picture};
 use crate::angles::{Corners, Residuals, targets};
 use crate::reduced_system::{Multipliers, ReducedSystem};
 
-/// Convergence: no angle moves farther in a full step, radians. It is 0.01 micrometre across the plate.
+/// Convergence: no angle changes by more in a full step, radians. It corresponds to 0.01 micrometre across the plate.
 const TOLERANCE: f64 = 1e-8;
 /// Largest number of steps; four to eight are usual.
 const MAX_STEPS: usize = 60;
-/// The system is factored again when a step is longer than this share of the one before.
+/// The system is factored again if a step is longer than this share of the previous one.
 const SLOW: f64 = 0.2;
-/// Least share of its distance to 0 and to pi that a step leaves to an angle.
+/// Smallest share of an angle's distance to 0 and to pi that must remain after a step.
 const KEPT: f64 = 0.1;
 
 /// Returns (u, v) per vertex, metres. `check` is called between the steps and stops the work with its error.

@@ -1,14 +1,16 @@
 //! Newton step with the angles and the triangles' multipliers eliminated (ABF++).
 //!
-//! With L the diagonal matrix of the weights and J the Jacobian of the constraints, triangles first, the step (dx, dm) solves
+//! With L the diagonal matrix of the weights and J the Jacobian of the constraints, triangles first, the step (dx, dm)
+//! solves
 //!
 //! ```text
 //! L dx + J' dm = -r        r = L (x - b) + J' m
 //! J dx         = -c
 //! ```
 //!
-//! J L^-1 J' dm = c - J L^-1 r is partitioned into triangles (1, diagonal) and vertices (2); its Schur complement in 2 is the
-//! sum over the triangles of Q P Q', with Q the Jacobian rows of the triangle's corners and P = L^-1 - L^-1 1 1' L^-1 / (1' L^-1 1).
+//! J L^-1 J' dm = c - J L^-1 r is partitioned into triangles (1, diagonal) and vertices (2). Its Schur complement in 2
+//! is the sum over the triangles of Q P Q', with Q the Jacobian rows of the triangle's corners and P = L^-1 - L^-1 1 1'
+//! L^-1 / (1' L^-1 1).
 
 use platen_numerics::sparse::{Graph, SparseError, Spd};
 
@@ -69,8 +71,8 @@ impl<'a> ReducedSystem<'a> {
         self.spd.factor()
     }
 
-    /// Solves for the step of angles and multipliers from `x`, `m` with the last factor. Adds the multipliers' step to `m` and
-    /// returns that of the angles.
+    /// Solves for the step of angles and multipliers from `x`, `m` with the last factor. Adds the multipliers' step to
+    /// `m` and returns the step of the angles.
     pub(crate) fn step(
         &self,
         x: &[Corners],
@@ -78,7 +80,7 @@ impl<'a> ReducedSystem<'a> {
         residuals: &Residuals,
         m: &mut Multipliers,
     ) -> Result<Vec<Corners>, SparseError> {
-        // L^-1 r, with the Jacobian at `x`, not that of the factor.
+        // L^-1 r, with the Jacobian at `x` and not that of the factor.
         let mut y: Vec<Corners> = Vec::with_capacity(x.len());
         let mut rhs = residuals.vertices.clone();
         for (t, (x, nodes)) in x.iter().zip(self.nodes).enumerate() {

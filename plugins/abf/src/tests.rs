@@ -18,7 +18,8 @@ fn check_order(surface: impl Fn([f64; 2]) -> [f64; 3] + Copy, size: [f64; 2], fi
     assert!(coarse / fine > 13.0, "order {}", (coarse / fine).log2() / 2.0);
 }
 
-/// The constraints as published: triangle sums less pi, vertex sums less 2 pi, quotients of the rings' products less 1.
+/// Returns the constraints as published: triangle sums less pi, vertex sums less 2 pi, quotients of the rings' products
+/// less 1.
 fn constraints(mesh: &DiskMesh, angles: &[[f64; 3]]) -> DVector<f64> {
     let (node_of, inner) = interior(mesh);
     let (mut sums, mut rings) = (vec![-TAU; inner.len()], vec![[1.0, 1.0]; inner.len()]);
@@ -62,8 +63,8 @@ fn the_angles_are_those_of_a_plane_mesh() {
     }
 }
 
-/// The condition of a minimum: the slope of the distance lies in the span of the constraints' slopes, these by differences
-/// of the constraints as published.
+/// Tests the condition of a minimum: the gradient of the distance lies in the span of the constraints' gradients, which
+/// are differences of the constraints as published.
 #[test]
 fn no_plane_angles_are_nearer() {
     let size = [3.0, 2.5];
@@ -91,7 +92,7 @@ fn no_plane_angles_are_nearer() {
     assert!(slope.norm() > 0.1 && left < 1e-6 * slope.norm(), "{left:e} of {:e}", slope.norm());
 }
 
-/// On a sphere it is as wrong as the harmonic map: 0.65 to 1.3 mm in the mean at R 10 m, 2.5 x 5 m.
+/// On a sphere its error equals that of the harmonic map: 0.65 to 1.3 mm in the mean at R 10 m, 2.5 x 5 m.
 #[test]
 fn on_a_sphere_it_is_wrong_by_a_millimetre() {
     let size = [2.5, 5.0];
@@ -102,7 +103,7 @@ fn on_a_sphere_it_is_wrong_by_a_millimetre() {
     );
 }
 
-/// Small meshes of every kind: noise up to the size of the cells. No panic, no hang, every coordinate finite.
+/// Small meshes of every kind, with noise up to the size of the cells: no panic, no hang, every coordinate finite.
 #[test]
 fn random_small_meshes_give_finite_charts_or_are_refused() {
     let mut refused = 0;

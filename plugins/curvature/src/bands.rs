@@ -11,9 +11,10 @@ use platen_shape::{EXPANDED, Surface};
 pub(crate) struct Band {
     /// Rotation of the plate from one side of the band to the other, radians, positive towards the scanner.
     pub(crate) angle: f64,
-    /// Sense of the patch, 1 or -1. It differs from the angle's where the patch is the spline's overshoot beside a stronger band.
+    /// Sense of the patch, 1 or -1. It differs from that of the angle if the patch is the spline's overshoot beside a
+    /// stronger band.
     sense: f64,
-    /// 95 %, radians.
+    /// Expanded uncertainty (95 %), radians.
     pub(crate) uncertainty: f64,
     /// Weighted centre of the patch, (u, v), metres.
     pub(crate) centre: [f64; 2],
@@ -27,7 +28,7 @@ pub(crate) struct Band {
     pub(crate) nodes: Vec<usize>,
     /// Unit direction across the band.
     across: [f64; 2],
-    /// Range across and range along, in the coordinates of these directions, metres.
+    /// Range across and range along the band, in the coordinates of these directions, metres.
     span: [[f64; 2]; 2],
 }
 
@@ -35,8 +36,9 @@ pub(crate) struct Band {
 const OVERSHOOT: f64 = 0.2;
 
 impl Band {
-    /// Returns whether the band bends in the sense of its patch by more than chance. Patches are selected as the most extreme
-    /// places of a map; where nothing changed, their angles reach one and a half times the uncertainty of an unselected place.
+    /// Returns whether the band bends in the sense of its patch by more than chance. Patches are selected as the most
+    /// extreme places of a map. On a plate without change their angles reach one and a half times the uncertainty of an
+    /// unselected place.
     pub(crate) fn is_significant(&self) -> bool {
         self.sense * self.angle > 2.0 * self.uncertainty
     }
@@ -55,12 +57,12 @@ const LINES: usize = 15;
 /// Step along them, metres, a tenth of a knot span.
 const STEP: f64 = 5e-3;
 
-/// Share of its peak to which the change has fallen at the foot of a band.
+/// Share of its peak to which the change has decreased at the foot of a band.
 const FOOT: f64 = 0.25;
 
 /// Length of the integration beyond the foot, metres. The spline overshoots beside a narrow bend, and only the integral
-/// including the overshoot is the plate's rotation. The length is fixed, because limits at the change of sign would select
-/// noise of one sign.
+/// including the overshoot is the plate's rotation. The length is fixed, because limits at the change of sign would
+/// select noise of one sign.
 const BEYOND: f64 = 0.1;
 
 /// Half step of the difference quotients in the uncertainty, metres.
@@ -118,7 +120,7 @@ impl<'a> Section<'a> {
         Self { surfaces, across, along: range([-y, x]), reach: range([x, y]) }
     }
 
-    /// Returns the places on the plate at distance `s` across the band, spread along it.
+    /// Returns points on the plate at distance `s` across the band, distributed along it.
     fn places(&self, s: f64) -> impl Iterator<Item = [f64; 2]> {
         let ([x, y], [first, last], now) = (self.across, self.along, self.surfaces[0]);
         (0..LINES)

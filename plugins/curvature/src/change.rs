@@ -11,8 +11,8 @@ use crate::{Nodes, Options, place};
 /// Median of chi squared with three degrees of freedom.
 const MEDIAN: f64 = 2.366;
 
-/// 95 % quantile of three times F with 3 and 40 degrees of freedom: wider than that of chi squared, 7.81, because the scale is
-/// estimated from the few tens of independent places of the pair.
+/// 95 % quantile of three times F with 3 and 40 degrees of freedom. It is larger than that of chi squared, 7.81,
+/// because the scale is estimated from the few tens of independent places of the pair.
 const DETECTED: f64 = 8.52;
 
 /// Adds the field, the bands and the sentences of the change between two scans, `[now, before]`.
@@ -97,12 +97,13 @@ fn bands(
     bands
 }
 
-/// Returns the scale of the empirical null distribution: the variance of the change relative to the stated one, from the
-/// median over the plate (Efron 2004).
+/// Returns the scale of the empirical null distribution: the variance of the change relative to the stated one, from
+/// the median over the plate (Efron 2004).
 ///
-/// A spline's covariance includes the smoothing bias, which is largest in curvature. Between two scans of an unchanged shape
-/// most of the bias is equal and cancels; the rest depends on the smoothing of each scan and is estimated from the pair. Never
-/// above 1: a plate with a larger median has changed over half of its area, or needs a calibration.
+/// A spline's covariance includes the smoothing bias, which is largest in curvature. Between two scans of an unchanged
+/// shape most of the bias is equal and cancels. The rest depends on the smoothing of each scan and is estimated from
+/// the pair. The scale is never above 1: a plate with a larger median has changed over half of its area, or needs a
+/// calibration.
 fn null_scale(mut chi_squared: Vec<f64>) -> f64 {
     if chi_squared.is_empty() {
         return 1.0;

@@ -1,4 +1,4 @@
-//! Curvature missing to the target.
+//! Curvature deficit: the curvature that is missing to the target.
 
 use platen_model::{Figure, NodeState, Report};
 use platen_sdk::PlateGrid;
@@ -44,8 +44,8 @@ pub(crate) fn add(report: &mut Report, nodes: &Nodes, target: &TargetSurface) {
     gaussian(report, nodes, target);
 }
 
-/// Adds the missing Gaussian curvature, for targets that have any. Bending alone does not change it (theorema egregium): the
-/// plate must stretch for it.
+/// Adds the missing Gaussian curvature, for targets that have any. Bending alone does not change it (theorema
+/// egregium), so the plate must stretch for it.
 fn gaussian(report: &mut Report, nodes: &Nodes, target: &TargetSurface) {
     let grid = nodes.grid;
     if !is_doubly_curved(nodes, target) {
@@ -59,7 +59,7 @@ fn gaussian(report: &mut Report, nodes: &Nodes, target: &TargetSurface) {
         |values: &[f64]| (0..PlateGrid::NODES).filter(known).map(|i| values[i]).sum::<f64>() * grid.cell();
     let (missing, wanted) = (total(&value), total(&goal));
     if wanted == 0.0 {
-        // Not a node is known: there is no share.
+        // No node is known, so there is no share.
         return;
     }
     let figures = &mut report.findings.figures;
@@ -76,15 +76,15 @@ fn gaussian(report: &mut Report, nodes: &Nodes, target: &TargetSurface) {
 
 /// Returns whether the target has Gaussian curvature, which bending alone cannot make.
 pub(crate) fn is_doubly_curved(nodes: &Nodes, target: &TargetSurface) -> bool {
-    // 1e-9 1/m^2: a sphere of 30 km.
+    // 1e-9 1/m^2 corresponds to a sphere of 30 km.
     nodes.grid.map(|u, v| target.curvature(u, v).gaussian).iter().any(|goal| goal.abs() >= 1e-9)
 }
 
 /// Nodes to each side over which a standard deviation is averaged: about one knot span.
 const REACH: usize = 2;
 
-/// Returns the root mean square around a node. The variance of a spline's curvature oscillates between the knots although
-/// neighbouring errors are the same error; averaging keeps neighbouring nodes in the same state.
+/// Returns the root mean square around a node. The variance of a spline's curvature oscillates between the knots
+/// although neighbouring nodes have the same error; averaging keeps neighbouring nodes in the same state.
 fn averaged(sigma: &[f64], node: usize) -> f64 {
     let range = |k: usize| k.saturating_sub(REACH)..(k + REACH + 1).min(PlateGrid::SIDE);
     let (rows, columns) = (range(node / PlateGrid::SIDE), range(node % PlateGrid::SIDE));

@@ -1,31 +1,34 @@
 //! Comparison `curvature`: change of curvature between two scans, and the curvature missing to the target.
 //!
-//! Curvature needs no alignment: the curvature at a material place does not depend on how the plate as a whole moved between
-//! two strokes. Its change is therefore the primary map of what a stroke did, and the target's curvature minus the plate's the
-//! map of what is still to bend. As in Masuda et al., "Point-based shape monitoring of plate bending for large-scale storage
-//! tanks", the B-spline surfaces of two strokes (section 4.4) are compared at equal (u, v). The level of detection, the bend
-//! angles and the comparison with a target are this project's own.
+//! Curvature needs no alignment: the curvature at a material point does not depend on the motion of the plate as a
+//! whole between two strokes. The change of curvature is therefore the primary map of the effect of a stroke. The
+//! target's curvature minus the plate's is the map of the bend that is still missing.
+//!
+//! As in Masuda et al., "Point-based shape monitoring of plate bending for large-scale storage tanks", the B-spline
+//! surfaces of two strokes (section 4.4) are compared at equal (u, v). The level of detection, the bend angles and the
+//! comparison with a target are this project's own.
 //!
 //! # Method
 //!
-//! *Level of detection*, 95 %, of a single curvature:
+//! *Level of detection* (LoD) of a single curvature, 95 %:
 //!
 //! ```text
 //! LoD = 1.96 sqrt(s^2 + s_corr^2),    s_corr = s_position (2 pi / L)^2
 //! ```
 //!
-//! with s from the spline's covariance and s_corr the correlated error of a position, taken as a wave of length L
-//! (`wavelength`).
+//! with s from the spline's covariance and s_corr from the correlated error of a position, assumed to be a wave of
+//! length L (`wavelength`).
 //!
-//! *Test of a change.* The change at a place has three components: along u, along v, twist. The place is *unchanged* when the
-//! sum of (change / s)^2 over the components is below its 95 % quantile under no change, with s^2 from both splines and s_corr.
-//! Before the test s is scaled down to the scatter of the quieter half of the plate (empirical null distribution; Efron,
-//! "Large-scale simultaneous hypothesis testing: the choice of a null hypothesis", JASA 99, 2004).
+//! *Test of a change.* The change at a place has three components: along u, along v, twist. The place is *unchanged* if
+//! the sum of (change / s)^2 over the components is below its 95 % quantile under no change, with s^2 from both splines
+//! and s_corr. Before the test s is scaled down to the scatter of the quieter half of the plate (empirical null
+//! distribution; Efron, "Large-scale simultaneous hypothesis testing: the choice of a null hypothesis", JASA 99, 2004).
 //!
-//! *Bend bands.* Connected changed places of one sense form a band. Its bend angle is the integral of the change of curvature
-//! across the band (Simpson's rule), to beyond its foot, averaged along the band. A patch smaller than `min_patch`, a patch that
-//! bends by less than twice its uncertainty, and the spline's overshoot beside a stronger band count as unchanged: by chance 5 %
-//! of an unchanged plate lies above the level of detection.
+//! *Bend bands.* Connected changed places of one sense form a band. Its bend angle is the integral of the change of
+//! curvature across the band (Simpson's rule), from beyond one foot of the band to beyond the other, averaged along the
+//! band. By chance 5 % of an unchanged plate lies above the level of detection. Therefore three kinds of patches count
+//! as unchanged: a patch smaller than `min_patch`, a patch that bends by less than twice its uncertainty, and the
+//! spline's overshoot beside a stronger band.
 //!
 //! # Example
 //!
@@ -47,15 +50,15 @@
 //!
 //! # Fields
 //!
-//! Of the mid-surface, positive when the centre lies on the scanner's side.
+//! Fields are of the mid-surface, and positive if the centre of curvature lies on the scanner's side.
 //!
 //! | field | unit | present | meaning |
 //! |---|---|---|---|
 //! | `kappa_u`, `kappa_v`, `kappa_uv` | 1/m | always | curvature along u, along v, twist |
 //! | `kappa_max`, `kappa_min`, `gaussian` | 1/m, 1/m2 | always | principal curvatures, Gaussian curvature |
 //! | `curvature_change` | 1/m | with an earlier scan | change in the direction in which it is largest |
-//! | `curvature_deficit` | 1/m | with a target | positive where the plate must bend more, neutral where it is enough |
-//! | `gaussian_missing` | 1/m2 | sphere, torus | Gaussian curvature for which the plate must still stretch |
+//! | `curvature_deficit` | 1/m | with a target | positive where the plate must bend more, neutral where it is bent enough |
+//! | `gaussian_missing` | 1/m2 | sphere, torus | Gaussian curvature that the plate must still gain by stretching |
 //! | `strain_u`, `strain_v`, `strain_uv` | 1 | sphere, torus | membrane strain of the mid-surface |
 //!
 //! # Figures
@@ -63,16 +66,16 @@
 //! | figure | unit | meaning |
 //! |---|---|---|
 //! | `curvature.lod` | 1/m | median level of detection |
-//! | `curvature.above_lod`, `curvature.changed_share` | 1 | share of the plate above it; share in bands |
+//! | `curvature.above_lod`, `curvature.changed_share` | 1 | share of the plate above the LoD; share in bands |
 //! | `bend.N.angle`, `.direction`, `.length`, `.width` | rad, rad, m, m | band N: angle with its place, direction of the straight lines, size |
-//! | `curvature.deficit_max`, `curvature.deficit_min`, `curvature.enough` | 1/m, 1/m, 1 | extremes beyond doubt; share that is done |
+//! | `curvature.deficit_max`, `curvature.deficit_min`, `curvature.enough` | 1/m, 1/m, 1 | significant extremes; share of the plate that is bent enough |
 //! | `gaussian.missing`, `gaussian.wanted`, `gaussian.missing_share` | 1 | Gaussian curvature integrated over what was seen (steradians); the share is 1 for a plate that only bent |
 //! | `strain.max`, `strain.min` | 1 | largest stretch and largest shortening in any direction |
 //!
 //! # Limits and errors
 //!
-//! Curvature near the edge of the plate is uncertain; see `trusted`. Refused are an earlier scan of a plate of another size and
-//! a target with an impossible radius.
+//! Curvature near the edge of the plate is uncertain; see `trusted`. Refused are an earlier scan of a plate of another
+//! size and a target with an impossible radius.
 
 mod bands;
 mod change;
@@ -158,7 +161,7 @@ impl Nodes {
 /// Compares the plate with its target and an earlier scan. `check` fails when the job was cancelled.
 fn compare(options: &Options, inputs: &Inputs, check: &dyn Fn() -> Result<()>) -> Result<Report> {
     let (task, now) = (&inputs.task, &inputs.now);
-    // The correlated error is that of a pair of scans; a single scan has half its variance.
+    // The correlated error belongs to a pair of scans; a single scan has half its variance.
     let correlated = task.sigma_correlated / 2.0_f64.sqrt();
     let correlated = correlated * (std::f64::consts::TAU / options.wavelength).powi(2);
     let nodes = Nodes::new(now, correlated, options.trusted);

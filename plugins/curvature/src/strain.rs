@@ -9,8 +9,8 @@ use crate::Nodes;
 /// Adds the membrane strain of the mid-surface: Green's strain of S(u, v) against the flat rectangle,
 /// (|S_u|^2 - 1) / 2, (|S_v|^2 - 1) / 2 and S_u . S_v / 2.
 ///
-/// The strain is that of the flattening's material map: of least energy with `elastic`; with `harmonic` it includes the map's
-/// own error.
+/// The strain is that of the flattening's material map: of least energy with `elastic`; with `harmonic` it includes the
+/// map's own error.
 pub(crate) fn add(report: &mut Report, nodes: &Nodes, now: &Surface) {
     let strain = nodes.grid.map(|u, v| {
         let d = now.derivatives(u, v);

@@ -1,4 +1,4 @@
-//! Maps, bands and null pairs on plates of closed form.
+//! Tests of maps, bands and null pairs on closed-form plates.
 
 use platen_model::{Facing, Figure, RadiusOf, Target, TargetShape, Task};
 use platen_shape::Vec3;
@@ -9,7 +9,7 @@ use super::*;
 const WIDTH: f64 = 3.0;
 const HEIGHT: f64 = 2.0;
 
-/// A plate bent along u with curvature k(u), as a fit to points with noise along the normal.
+/// Returns a plate bent along u with curvature k(u), as a fit to points with noise along the normal.
 fn plate(sigma: f64, seed: u64, k: impl Fn(f64) -> f64) -> Surface {
     let mut random = fastrand::Rng::with_seed(seed);
     let mut noise = || {
@@ -37,7 +37,7 @@ fn plate(sigma: f64, seed: u64, k: impl Fn(f64) -> f64) -> Surface {
     Surface::new(fit.solve([0.0, 0.0, 1.0]).expect("determined"), 0.04, mask)
 }
 
-/// A bend of 0.15 1/m over 0.3 m round u: 0.0225 rad.
+/// Returns a bend of 0.15 1/m over 0.3 m around u: 0.0225 rad.
 fn band(at: f64) -> impl Fn(f64) -> f64 {
     move |u| {
         let x = ((u - at) / 0.3 + 0.5).clamp(0.0, 1.0);
@@ -79,7 +79,7 @@ fn field<'a>(report: &'a Report, name: &str) -> &'a Field {
     report.fields.iter().find(|f| f.name == name).unwrap_or_else(|| panic!("no {name}"))
 }
 
-/// Noise of 24,000 points that stands for 0.5 mm on the 167,000 of a scan at 6 mm.
+/// Noise of 24,000 points that is equivalent to 0.5 mm on the 167,000 points of a scan at 6 mm.
 const SIGMA: f64 = 0.19e-3;
 
 #[test]
@@ -147,7 +147,7 @@ fn null_pairs_show_five_percent_of_the_area_and_no_band() {
 fn the_deficit_says_bend_more_or_too_far_on_either_face() {
     for (facing, side) in [(Facing::Inside, 1.0), (Facing::Outside, -1.0)] {
         let target = TargetShape::Cylinder { radius: 8.0, axis: std::f64::consts::FRAC_PI_2 };
-        // Flat up to 1 m, 6 m round beyond 2 m, right between.
+        // Flat up to 1 m, radius 6 m beyond 2 m, correct between.
         let bent = |u: f64| {
             side * if u < 1.0 {
                 0.0
@@ -183,7 +183,7 @@ fn a_sphere_target_lacks_most_across_a_cylinder() {
     let middle = field(&report, "curvature_deficit").values[PlateGrid::NODES / 2];
     // Found: 2e-5 1/m; 2.4e-6 1/m2; a share of 4e-5; 0.0019 sr, of the nodes on the edges, which count as full cells.
     assert!((middle - 1.0 / 8.0).abs() < 4e-5, "{middle}");
-    // Bending alone has none of the sphere's Gaussian curvature.
+    // A plate that was only bent has none of the sphere's Gaussian curvature.
     let missing = field(&report, "gaussian_missing").values[PlateGrid::NODES / 2];
     assert!((missing - 1.0 / 64.0).abs() < 5e-6, "{missing}");
     assert!((found(&report, "gaussian.missing_share").expect("known").value - 1.0).abs() < 8e-5);
@@ -194,7 +194,7 @@ fn a_sphere_target_lacks_most_across_a_cylinder() {
         "{:?}",
         report.findings.says
     );
-    // A plate that only bent has no membrane strain.
+    // A plate that was only bent has no membrane strain.
     for name in ["strain.max", "strain.min"] {
         let strain = found(&report, name).expect("known").value;
         // Found: 4.8e-4 and 0.6e-4.
@@ -247,7 +247,7 @@ fn another_plate_and_an_impossible_target_are_refused() {
     assert!(error.to_string().contains("is no radius"));
 }
 
-/// Points and normals keep the frame of the scan out of the curvature.
+/// Points and normals show that the curvature does not depend on the frame of the scan.
 #[test]
 fn moving_the_plate_changes_nothing() {
     let surface = plate(SIGMA, 3, band(1.0));

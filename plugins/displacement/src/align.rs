@@ -1,4 +1,4 @@
-//! Alignment: rigid motion of the plate as a whole, by weighted least squares.
+//! Alignment of two scans: the rigid motion of the plate as a whole, by weighted least squares.
 
 use nalgebra::{Matrix6, Rotation3, Vector6};
 use platen_sdk::{PlateGrid, Result};
@@ -10,7 +10,7 @@ use crate::nodes::Nodes;
 const NODES: usize = PlateGrid::SIDE;
 
 /// Standard deviation of a material point within the surface, metres, as observed on scans of good plates. The normal
-/// direction is ten times more certain and determines the alignment; this prevents sliding.
+/// direction is ten times more certain and determines the alignment; this value prevents sliding.
 const TANGENT_SIGMA: f64 = 0.3e-3;
 
 /// Least standard deviation along the normal, metres: errors outside the fits' covariances (lattice, range bias).
@@ -85,7 +85,7 @@ pub(crate) fn corners(nodes: &Nodes) -> Motion {
     fit(nodes, &[0, last, NODES * last, NODES * last + last])
 }
 
-/// Fits all places of a short list.
+/// Fits all points of a short list.
 pub(crate) fn places(nodes: &Nodes) -> Motion {
     fit(nodes, &(0..nodes.now.len()).collect::<Vec<_>>())
 }
@@ -123,7 +123,8 @@ pub(crate) fn unchanged(check: &dyn Fn() -> Result<()>, nodes: &Nodes) -> Result
     Ok((motion, weights))
 }
 
-/// Returns the motion by unweighted least squares (Kabsch), the start of Gauss-Newton: it also finds a plate turned by half a turn.
+/// Returns the motion by unweighted least squares (Kabsch), as the start of Gauss-Newton. It also finds a plate that
+/// was turned by half a turn.
 fn closed_form(nodes: &Nodes, places: impl Iterator<Item = usize>) -> Motion {
     let seen = places.filter(|i| nodes.seen[*i]);
     let placement = Placement::of_pairs(seen.map(|i| (nodes.before[i], nodes.now[i])));
@@ -132,7 +133,7 @@ fn closed_form(nodes: &Nodes, places: impl Iterator<Item = usize>) -> Motion {
     Motion { rotation: placement.rotation(), translation, pivot, ..Motion::none() }
 }
 
-/// Fits all places that were seen.
+/// Fits all points that were seen.
 fn all_seen(nodes: &Nodes) -> Motion {
     let places = || (0..PlateGrid::NODES).step_by(7);
     let mut motion = closed_form(nodes, places());
@@ -158,8 +159,8 @@ fn local(nodes: &Nodes, start: &Motion, row: usize, column: usize) -> Motion {
     motion
 }
 
-/// Returns the standard deviation of a place along the normal. The scanner's correlated error is part of it: a fit to the scale of
-/// the noise alone follows one crest of a wave and leaves the other as a change.
+/// Returns the standard deviation of a point along the normal. It includes the scanner's correlated error: a fit scaled
+/// to the noise alone follows one crest of a wave and leaves the other as a change.
 fn sigma_normal(nodes: &Nodes, i: usize) -> f64 {
     nodes.sigma[i].hypot(NORMAL_FLOOR).hypot(nodes.correlated)
 }
@@ -174,7 +175,7 @@ fn inliers(nodes: &Nodes, motion: &Motion) -> f64 {
     (0..PlateGrid::NODES).step_by(3).filter(near).count() as f64
 }
 
-/// Returns Tukey's biweight of every node, to the scale of [`scatter`].
+/// Returns Tukey's biweight of every node, scaled by [`scatter`].
 fn weights(nodes: &Nodes, motion: &Motion) -> Vec<f64> {
     let residual: Vec<f64> = (0..PlateGrid::NODES).map(|i| scaled_residual(nodes, motion, i)).collect();
     let scale = scatter(nodes, &residual);
@@ -182,10 +183,11 @@ fn weights(nodes: &Nodes, motion: &Motion) -> Vec<f64> {
     residual.into_iter().map(|r| weight(r / (TUKEY * scale))).collect()
 }
 
-/// Returns the standard deviation of the scaled residuals of the part that kept its shape: from the shortest interval that contains
-/// half of them (Rousseeuw, Leroy, "Robust Regression and Outlier Detection", 1987, 4.3, the shorth), wherever a first fit has
-/// put it. Not below the noise of the fits, not above 1, all that is stated: the errors of a good scanner are smaller than its data sheet's,
-/// and to the scale of the latter a change would draw the alignment with it.
+/// Returns the standard deviation of the scaled residuals of the part that kept its shape. It is computed from the
+/// shortest interval that contains half of the residuals (the shorth; Rousseeuw, Leroy, "Robust Regression and Outlier
+/// Detection", 1987, 4.3), wherever a first fit has placed it. It is not below the noise of the fits, and not above 1,
+/// the stated error. A good scanner has smaller errors than its data sheet states; with the scale of the data sheet a
+/// change would shift the alignment.
 fn scatter(nodes: &Nodes, residual: &[f64]) -> f64 {
     let of_seen = |value: &dyn Fn(usize) -> f64| {
         let mut values: Vec<f64> = (0..PlateGrid::NODES).filter(|i| nodes.seen[*i]).map(value).collect();
@@ -199,11 +201,11 @@ fn scatter(nodes: &Nodes, residual: &[f64]) -> f64 {
     (SHORTH * shortest.unwrap_or(0.0)).clamp(noise.min(1.0), 1.0)
 }
 
-/// Nodes per independent place: a spline has fewer degrees of freedom than the fields have nodes. One in 25, as in the
+/// Nodes per independent point: a spline has fewer degrees of freedom than the fields have nodes. One in 25, as in the
 /// result's own grid.
 const SHARING: f64 = 25.0;
 
-/// Takes one Gauss-Newton step of the weighted fit over the given places; `inflation` scales the covariance.
+/// Takes one Gauss-Newton step of the weighted fit over the given points; `inflation` scales the covariance.
 fn step(nodes: &Nodes, motion: &mut Motion, places: impl Iterator<Item = (usize, f64)>, inflation: f64) {
     let mut normal_matrix = Matrix6::zeros();
     let mut gradient = Vector6::zeros();

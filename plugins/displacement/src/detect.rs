@@ -1,4 +1,4 @@
-//! Detection of change: displacement, level of detection, significant patches.
+//! Change detection: displacement, level of detection, significant patches.
 
 use platen_model::NodeState;
 use platen_sdk::PlateGrid;
@@ -7,28 +7,30 @@ use platen_shape::{EXPANDED, Vec3};
 use crate::align::Alignment;
 use crate::nodes::Nodes;
 
-/// Standard deviations that the largest of 441 independent places of an unchanged plate exceeds in 5 % of the pairs
-/// (two-sided, Bonferroni); places nearer than a seventh of a metre are correlated. Five nodes in a hundred lie above their
-/// level of detection by chance, and they are neighbours; a patch is therefore a change only when one of its nodes exceeds this.
+/// Number of standard deviations that the largest of 441 independent places of an unchanged plate exceeds in 5 % of the
+/// pairs (two-sided, Bonferroni); places nearer than a seventh of a metre are correlated. Five nodes in a hundred lie
+/// above their level of detection by chance, and they are neighbours. A patch is therefore a change only if one of its
+/// nodes exceeds this limit.
 const SIGNIFICANT: f64 = 3.86;
 
-/// The same for the scanner's correlated error, whose waves are half a metre to a metre long: of 30 independent places.
+/// The same limit for the scanner's correlated error, whose waves are half a metre to a metre long: for 30 independent
+/// places.
 const SIGNIFICANT_CORRELATED: f64 = 3.144;
 
 /// Displacement at every node.
 #[derive(Debug)]
 pub(crate) struct Changes {
-    /// Scanner frame, metres.
+    /// Displacement vectors, scanner frame, metres.
     pub(crate) vectors: Vec<Vec3>,
-    /// Along the normal, towards the scanner, metres.
+    /// Displacement along the normal, towards the scanner, metres.
     pub(crate) normal: Vec<f64>,
     /// Standard deviation of the displacement along the normal, metres.
     pub(crate) sigma: Vec<f64>,
     /// Level of detection, metres.
     pub(crate) lod: Vec<f64>,
-    /// Median of the level of detection over what was seen, metres.
+    /// Median of the level of detection over the seen nodes, metres.
     pub(crate) median_lod: f64,
-    /// Share of what was seen that lies above it, before patches are dropped.
+    /// Share of the seen nodes that lies above it, before patches are dropped.
     pub(crate) above_lod: f64,
     /// State of every node.
     pub(crate) state: Vec<NodeState>,
@@ -45,7 +47,7 @@ pub(crate) fn changes(
     let normal: Vec<f64> = vectors.iter().zip(&nodes.normal).map(|(d, n)| d.dot(n)).collect();
     let sigma: Vec<f64> = (0..PlateGrid::NODES)
         .map(|i| {
-            // Where a place determines the alignment, the alignment follows its error and does not add to it.
+            // Where a place determines the alignment, the alignment follows its error, which is then not added.
             let align = motion.sigma(&nodes.before[i], &nodes.normal[i]) * (1.0 - weights[i]).sqrt();
             nodes.sigma[i].hypot(nodes.correlated).hypot(align)
         })

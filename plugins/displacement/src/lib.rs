@@ -1,13 +1,14 @@
-//! Comparison `displacement`: movement of every material place between two scans, after alignment.
+//! Comparison `displacement`: movement of every material point between two scans, after alignment.
 //!
-//! As in Masuda et al., "Point-based shape monitoring of plate bending for large-scale storage tanks", the B-spline surfaces
-//! of two strokes (section 4.4) are compared at equal (u, v). After a stroke the plate has moved as a whole and has no part that
-//! is certain to be still, so a displacement depends on its alignment. Every sentence names the alignment, and the rigid motion
-//! that it removes is reported. Alignment and level of detection are this project's own.
+//! As in Masuda et al., "Point-based shape monitoring of plate bending for large-scale storage tanks", the B-spline
+//! surfaces of two strokes (section 4.4) are compared at equal (u, v). After a stroke the plate has moved as a whole,
+//! and no part of it is certain to be at rest. A displacement therefore depends on its alignment. Every sentence of the
+//! report states the alignment, and the rigid motion that it removes is reported. Alignment and level of detection are
+//! this project's own.
 //!
 //! # Method
 //!
-//! *Alignment.* A rigid motion of the earlier plate, by weighted least squares (Gauss-Newton) over material points:
+//! *Alignment.* The earlier plate is moved rigidly, by weighted least squares (Gauss-Newton) over material points:
 //!
 //! | `alignment` | motion |
 //! |---|---|
@@ -16,18 +17,24 @@
 //! | `supports` | least squares of the places on the press's supports, `[[support]]` of the plate file |
 //! | `none` | identity: for a plate on fixed supports under a fixed scanner |
 //!
-//! *Level of detection*, 95 %. A place is *unchanged* when its displacement along the normal is below
+//! *Level of detection* (LoD), 95 %. A place is *unchanged* if its displacement along the normal is below
 //!
 //! ```text
 //! LoD = 1.96 sqrt(s1^2 + s2^2 + s_corr^2 + s_align^2)
 //! ```
 //!
-//! with s1 and s2 from the splines' covariances without their smoothing bias, which is equal in both scans; s_corr from the
-//! plant's null pairs, until there are any from the range error of the scanner's data sheet; s_align from the covariance of the alignment, less where the place itself determines the alignment.
+//! where
 //!
-//! *Patches.* By chance 5 % of an unchanged plate lies above the LoD. Connected places above it are a change only when they
-//! cover `min_patch` and one of them exceeds 3.86 standard deviations (1.97 LoD), which happens on one unchanged plate in twenty
-//! (two-sided, Bonferroni over 441 independent places); of the part s_corr, whose waves are long, 3.14 (30 places).
+//! - s1 and s2 come from the splines' covariances without their smoothing bias, which is equal in both scans;
+//! - s_corr comes from the plant's null pairs or, until there are any, from the range error of the scanner's data
+//!   sheet;
+//! - s_align comes from the covariance of the alignment, and is smaller where the place itself determines the
+//!   alignment.
+//!
+//! *Patches.* By chance 5 % of an unchanged plate lies above the LoD. Connected places above it count as a change only
+//! if they cover `min_patch` and one of them exceeds 3.86 standard deviations (1.97 LoD). This happens on one unchanged
+//! plate in twenty (two-sided, Bonferroni over 441 independent places). For the part s_corr, whose waves are long, the
+//! limit is 3.14 (30 places).
 //!
 //! # Example
 //!
@@ -63,8 +70,8 @@
 //!
 //! # Limits and errors
 //!
-//! Without an earlier scan the report contains no figures. Refused are an earlier scan of a plate of another size, and `supports`
-//! with fewer than three supports in sight.
+//! Without an earlier scan the report contains no figures. Refused are an earlier scan of a plate of another size, and
+//! `supports` with fewer than three supports in sight.
 
 mod align;
 mod detect;
@@ -151,7 +158,7 @@ fn report(
     against: &str,
 ) -> Report {
     let changed = changes.state.iter().filter(|s| **s == NodeState::Seen).count();
-    // The significant changes; without any, all that was seen.
+    // Counts the significant changes; without any, all seen nodes.
     let counts = |state: NodeState| state == NodeState::Seen || changed == 0 && state != NodeState::Unseen;
     let largest = (0..PlateGrid::NODES)
         .filter(|&i| counts(changes.state[i]))

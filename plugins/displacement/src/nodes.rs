@@ -1,4 +1,4 @@
-//! Both surfaces at equal (u, v).
+//! Material points of both surfaces at equal (u, v).
 
 use platen_sdk::PlateGrid;
 use platen_shape::{Surface, Vec3};
@@ -6,11 +6,11 @@ use platen_shape::{Surface, Vec3};
 /// Material points of the plate, v outer, u inner.
 #[derive(Debug)]
 pub(crate) struct Nodes {
-    /// Their places on the rectangle.
+    /// Their positions on the rectangle.
     pub(crate) grid: PlateGrid,
-    /// On the scanned face now.
+    /// Positions on the scanned face now.
     pub(crate) now: Vec<Vec3>,
-    /// On the scanned face then.
+    /// Positions on the scanned face in the earlier scan.
     pub(crate) before: Vec<Vec3>,
     /// Unit normal now, towards the scanner.
     pub(crate) normal: Vec<Vec3>,
@@ -18,7 +18,7 @@ pub(crate) struct Nodes {
     pub(crate) sigma: Vec<f64>,
     /// Standard deviation of the scanner's correlated error of a difference, metres.
     pub(crate) correlated: f64,
-    /// Whether both scans saw the place.
+    /// Whether both scans saw the point.
     pub(crate) seen: Vec<bool>,
 }
 
@@ -44,7 +44,7 @@ impl Nodes {
         }
     }
 
-    /// Returns the earlier position of the middle place of the list: for the whole grid, the middle of the plate.
+    /// Returns the earlier position of the middle point of the list: for the whole grid, the middle of the plate.
     pub(crate) fn centre(&self) -> Vec3 {
         self.before[self.before.len() / 2]
     }

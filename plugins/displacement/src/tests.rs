@@ -1,4 +1,4 @@
-//! Known movements, bands and null pairs on plates of closed form.
+//! Tests with known movements, bands and null pairs on closed-form plates.
 
 use nalgebra::Rotation3;
 use platen_model::{Support, Task};
@@ -10,10 +10,10 @@ use super::*;
 const WIDTH: f64 = 3.0;
 const HEIGHT: f64 = 2.0;
 
-/// Noise of 24,000 points that stands for 0.5 mm on the 167,000 of a scan at 6 mm.
+/// Noise of 24,000 points that is equivalent to 0.5 mm on the 167,000 points of a scan at 6 mm.
 const SIGMA: f64 = 0.19e-3;
 
-/// Returns a generator. Consecutive seeds of this generator are correlated, so seeds are spread out.
+/// Returns a generator. Generators with consecutive seeds are correlated, so the seeds are spread out.
 fn spread(seed: u64) -> fastrand::Rng {
     fastrand::Rng::with_seed(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15))
 }
@@ -27,7 +27,8 @@ impl Noise {
     }
 }
 
-/// Mid-surface and normal of a plate bent along u: 9 m round, and `extra` radians more over 0.3 m round u = 2.
+/// Returns mid-surface and normal of a plate bent along u: radius 9 m, and `extra` radians more over 0.3 m around u =
+/// 2.
 fn shape(extra: f64) -> impl Fn(f64) -> (Vec3, Vec3) {
     let n = 6000;
     let h = WIDTH / f64::from(n);
@@ -48,7 +49,7 @@ fn shape(extra: f64) -> impl Fn(f64) -> (Vec3, Vec3) {
     }
 }
 
-/// A scan of that plate: noise along the normal, and an error `wave(u, v)` that the fit cannot know of.
+/// Returns a scan of that plate: noise along the normal, and an error `wave(u, v)` that is not in the fit's covariance.
 fn plate(sigma: f64, seed: u64, extra: f64, wave: impl Fn(f64, f64) -> f64) -> Surface {
     let mut noise = Noise(spread(seed));
     let shape = shape(extra);
@@ -65,7 +66,7 @@ fn plate(sigma: f64, seed: u64, extra: f64, wave: impl Fn(f64, f64) -> f64) -> S
     Surface::new(fit.solve([0.0, 0.0, 1.0]).expect("determined"), 0.04, mask)
 }
 
-/// The plate lying elsewhere.
+/// Returns the plate in another pose.
 fn moved(surface: &Surface, turn: Rotation3<f64>, away: Vec3) -> Surface {
     let mut parts = surface.to_parts();
     for p in &mut parts.control {
@@ -107,7 +108,7 @@ fn a_plate_on_its_supports_is_aligned_by_them() {
         Inputs { task, now: now.clone(), before: Some(before.clone()), baseline: None }
     };
     let options = Options { against: "before".into(), alignment: "supports".into(), min_patch: 0.02 };
-    // Supports on both sides of the new bend: neither side lies where it lay, but the supports do.
+    // Supports on both sides of the new bend: both sides have moved, but the supports have not.
     let places = [[0.3, 0.3], [0.3, 1.7], [2.7, 0.3], [2.7, 1.7]];
     let report = compare(&options, &task(&places), &|| Ok(())).expect("sound");
     let normal = &report.fields[1].values;
@@ -116,7 +117,7 @@ fn a_plate_on_its_supports_is_aligned_by_them() {
         // Found: 0.012 mm, the noise of the fits.
         assert!(normal[node].abs() < 0.025e-3, "{u} {v}: {}", normal[node]);
     }
-    // 0.02 rad round u = 2, held at 0.3 and 2.7: it sinks by 0.02 * 1.7 * 0.7 / 2.4 there.
+    // 0.02 rad around u = 2, held at 0.3 and 2.7: it sinks there by 0.02 * 1.7 * 0.7 / 2.4.
     let bend = normal[50 * PlateGrid::SIDE + 67];
     // Found: 0.44 mm off, by the roundness of the bend.
     assert!((bend + 0.02 * 1.7 * 0.7 / 2.4).abs() < 0.5e-3, "{bend}");
@@ -165,7 +166,7 @@ fn a_new_bend_lifts_one_side_and_leaves_the_other() {
     let now = moved(&plate(SIGMA, 4, extra, none), turn, Vec3::new(1.0, 0.3, 0.1));
     let report = run(now, before, "unchanged", 0.0, 0.02);
     let (vectors, normal) = (&report.fields[0], &report.fields[1]);
-    // The larger part, up to u = 1.85, lies still; beyond the bend the plate is turned by 0.02.
+    // The larger part, up to u = 1.85, is at rest; beyond the bend the plate is turned by 0.02.
     let (old, new) = (shape(0.0), shape(extra));
     let (mut square, mut square_vector, mut still, mut changed) = (0.0, 0.0, 0, 0);
     for i in 0..PlateGrid::NODES {
@@ -187,8 +188,8 @@ fn a_new_bend_lifts_one_side_and_leaves_the_other() {
     assert!(report.findings.says[0].contains("aligned by unchanged"), "{:?}", report.findings.says);
 }
 
-/// Changes between pairs of scans of one shape: 0.5 mm noise, a small shift of the pose, and a wave of `amplitude` whose phase
-/// and direction differ between the two.
+/// Returns the changes between pairs of scans of one shape: 0.5 mm noise, a small shift of the pose, and a wave of
+/// `amplitude` whose phase and direction differ between the two.
 fn null_pairs(seeds: std::ops::Range<u64>, amplitude: f64, sigma_correlated: f64) -> Vec<detect::Changes> {
     let mut random = fastrand::Rng::with_seed(seeds.start);
     let mut scan = |seed: u64| {
@@ -207,7 +208,8 @@ fn null_pairs(seeds: std::ops::Range<u64>, amplitude: f64, sigma_correlated: f64
     changes.collect()
 }
 
-/// Number of null pairs. Each scatters by 0.05, so 20 decide little; `PLATEN_NULL_PAIRS=200` takes a minute.
+/// Returns the number of null pairs. Each scatters by 0.05, so 20 are weak evidence; `PLATEN_NULL_PAIRS=200` takes a
+/// minute.
 fn wanted() -> u64 {
     std::env::var("PLATEN_NULL_PAIRS").ok().and_then(|n| n.parse().ok()).unwrap_or(20)
 }
@@ -216,8 +218,8 @@ fn share_above_lod(pairs: &[detect::Changes]) -> f64 {
     pairs.iter().map(|pair| pair.above_lod).sum::<f64>() / pairs.len() as f64
 }
 
-/// Returns the false change without calibration, the correlated error with which null pairs show 5 % of their area as `platen
-/// calibrate` finds it, and the false change of other pairs with that calibration.
+/// Returns three figures: the false change without calibration; the correlated error with which null pairs show 5 % of
+/// their area, as `platen calibrate` finds it; the false change of other pairs with that calibration.
 fn calibrated(seeds: u64, amplitude: f64, judged: u64) -> [f64; 3] {
     let shown = |sigma: f64| share_above_lod(&null_pairs(seeds..seeds + judged * 3 / 5, amplitude, sigma));
     let uncalibrated = shown(0.0);
@@ -243,7 +245,7 @@ fn null_pairs_show_five_percent_of_the_area() {
     let bound = if wanted < 200 { 0.02..0.08 } else { 0.04..0.06 };
     for (seeds, amplitude) in [(1000, 0.0), (3000, 0.1e-3)] {
         let [before, sigma, after] = calibrated(seeds, amplitude, wanted);
-        // Two waves of any phase differ by this much, less what the alignment takes.
+        // Two waves of any phase differ by this much, less the part that the alignment absorbs.
         assert!((0.6 * amplitude..amplitude.max(0.02e-3)).contains(&sigma), "{sigma}");
         // Noise alone needs no calibration.
         assert!(amplitude > 0.0 || bound.contains(&before), "{before}");
@@ -257,13 +259,13 @@ fn no_patch_of_a_null_pair_is_a_change() {
     let pairs = null_pairs(5000..5000 + wanted, 0.0, 0.0);
     let n = pairs.iter().filter(|pair| pair.state.contains(&NodeState::Seen)).count();
     println!("{n} of {wanted} null pairs show a patch of change");
-    // One in twenty at most; three standard deviations beyond it are 4 of 20, 20 of 200.
+    // One in twenty at most; three standard deviations above that are 4 of 20, 20 of 200.
     let most = 0.05 * wanted as f64;
     assert!((n as f64) < most + 3.0 * (0.95 * most).sqrt(), "{n} of {wanted}");
 }
 
-/// Returns the share found of a plateau over a twelfth of the plate that rises by `times` the level of detection, between pairs
-/// of scans with waves of `amplitude`, by a scanner calibrated to `sigma_correlated`.
+/// Returns the detected share of a plateau over a twelfth of the plate that rises by `times` the level of detection,
+/// between pairs of scans with waves of `amplitude`, by a scanner calibrated to `sigma_correlated`.
 fn found(times: f64, amplitude: f64, sigma_correlated: f64) -> f64 {
     let mut random = fastrand::Rng::with_seed(77);
     let mut wave = || {

@@ -1,4 +1,4 @@
-//! Time of the elastic flattening by number of vertices: a 4 x 4 m plate, jittered, Delaunay.
+//! Benchmark of the elastic flattening by number of vertices: a 4 x 4 m plate, jittered, Delaunay.
 
 #[path = "../src/boundary_springs.rs"]
 mod boundary_springs;

@@ -1,21 +1,24 @@
-//! Boundary springs: the prior of the outline on the material places of the boundary.
+//! Boundary springs: the prior of the outline on the material positions of the boundary.
 //!
-//! The position of an edge is known with standard deviation `edge_sigma`, that of a corner with `corner_sigma`; the material
-//! may slide along an edge. Each is a spring along the outline's normal at the vertex, at a corner along the normals of both
-//! edges. Sliding by s along an edge of radius R leaves the edge by s^2 / 2R, which is negligible on a plate.
+//! The position of an edge is known with standard deviation `edge_sigma`, that of a corner with `corner_sigma`; the
+//! material may slide along an edge. Each uncertainty is modelled by a spring along the outline's normal at the vertex,
+//! at a corner along the normals of both edges. Sliding by s along an edge of radius R leaves the edge by s^2 / 2R,
+//! which is negligible on a plate.
 //!
-//! The stiffness makes the minimum of membrane energy plus springs the maximum a posteriori chart when the membrane strain has
-//! the standard deviation `strain` around zero and the edge's position `edge_sigma`, fully correlated along the edge. The
-//! springs of one edge share, by arc length,
+//! The stiffness is chosen so that the minimum of membrane energy plus springs is the maximum a posteriori chart. The
+//! assumed priors are: the membrane strain has the standard deviation `strain` around zero, and the edge's position has
+//! `edge_sigma`, fully correlated along the edge. The total stiffness of one edge, distributed to its springs by arc
+//! length, is
 //!
 //! ```text
 //! k = strain^2 W H / edge_sigma^2        (Young's modulus 1)
 //! ```
 //!
-//! `strain` is the standard deviation of the harmonic map's strain about its mean over the plate; the mean is the effect of
-//! misplaced edges. On a sphere, where the plate must be strained, the edges are therefore practically fixed (strain 2e-3,
-//! 4 x 3 m, 0.1 mm: k = 5000 against about 1 of the plate). On a rolled plate, whose own dimensions are more certain than
-//! its edges' positions, a misfit is shared between two opposite edges instead of stretching the plate.
+//! `strain` is the standard deviation of the harmonic map's strain about its mean over the plate; the mean is the
+//! effect of misplaced edges. On a sphere, where the plate must be strained, the edges are therefore practically fixed
+//! (strain 2e-3, 4 x 3 m, 0.1 mm: k = 5000 against about 1 of the plate). On a rolled plate the dimensions are more
+//! certain than the positions of the edges. There a misfit is shared between two opposite edges instead of stretching
+//! the plate.
 
 use platen_numerics::sparse::Spd;
 use platen_shape::DiskMesh;
@@ -26,7 +29,7 @@ const MIN_SIGMA: f64 = 1e-6;
 /// Least standard deviation of the strain: the thermal strain of 1 K.
 const MIN_STRAIN: f64 = 1e-5;
 
-/// Spring from a vertex to its known place, along one direction.
+/// Spring from a vertex to its known position, along one direction.
 struct Spring {
     vertex: u32,
     normal: [f64; 2],
@@ -35,7 +38,7 @@ struct Spring {
 }
 
 impl Spring {
-    /// Returns the distance of the vertex from its known place along the normal.
+    /// Returns the distance of the vertex from its known position along the normal.
     fn stretch(&self, x: &[[f64; 2]]) -> f64 {
         let x = x[self.vertex as usize];
         self.normal[0] * (x[0] - self.place[0]) + self.normal[1] * (x[1] - self.place[1])
@@ -95,7 +98,8 @@ impl BoundarySprings {
     }
 }
 
-/// Returns the unit normal of the outline at position `at` of an edge: perpendicular to the chord between its neighbours.
+/// Returns the unit normal of the outline at position `at` of an edge: perpendicular to the chord between its
+/// neighbours.
 fn normal(mesh: &DiskMesh, edge: usize, at: usize) -> [f64; 2] {
     let range = mesh.edge(edge);
     let place = |at: usize| mesh.places[at % mesh.places.len()];

@@ -1,4 +1,4 @@
-//! Chart of a mesh: start, minimum of the energy, uncertainty.
+//! Chart of a mesh, in three steps: start, minimum of the energy, uncertainty.
 
 use platen_sdk::Result;
 use platen_shape::flatten::{cotangents, first_turned, fixed_boundary};

@@ -1,10 +1,11 @@
-//! Bound of the material law's effect on a material place: inextensible fibres against least energy.
+//! Bound on the effect of the material law on a material position: inextensible fibres compared with least energy.
 //!
-//! Steel that was pressed stroke by stroke need not lie where its membrane energy is least. The opposite extreme is that
-//! the fibres along one side of the plate kept their length and all strain went across them. The distance between the two
-//! hypotheses, the larger of fibres along u and fibres along v, is the uncertainty of a place.
+//! The material of a plate that was pressed stroke by stroke need not lie where its membrane energy is least. The
+//! opposite extreme is that the fibres along one side of the plate kept their length and all strain went across them.
+//! The distance between the two hypotheses is the uncertainty of a position; the larger distance of fibres along u and
+//! fibres along v is taken.
 //!
-//! Strains are small, so the second hypothesis is one linear step from the first. The shift d of the material places
+//! Strains are small, so the second hypothesis is one linear step from the first. The shift d of the material
 //! minimises, by linear finite elements,
 //!
 //! ```text
@@ -34,9 +35,10 @@ struct Grid {
     strains: Vec<Sym>,
 }
 
-/// Returns the absolute shift in u and in v of each place of `uv`, the larger of the two fibre hypotheses, metres.
+/// Returns the absolute shift in u and in v of each position of `uv`, the larger of the two fibre hypotheses, metres.
 ///
-/// `strains` contains the state of every triangle, `uv` the places of least energy, `size` the extent of the plate in metres.
+/// `strains` contains the state of every triangle, `uv` the positions of least energy, `size` the extent of the plate
+/// in metres.
 ///
 /// # Errors
 /// [`SparseError`].

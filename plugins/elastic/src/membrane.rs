@@ -1,6 +1,7 @@
-//! St. Venant-Kirchhoff membrane energy of the map from the flat plate to the measured mesh: value, gradient, projected Hessian.
+//! St. Venant-Kirchhoff membrane energy of the map from the flat plate to the measured mesh: value, gradient, projected
+//! Hessian.
 //!
-//! The unknowns are the material places x = (u, v) of the mesh's vertices; the positions in space are given. In a
+//! The unknowns are the material positions x = (u, v) of the mesh's vertices; the positions in space are given. In a
 //! triangle the deformation gradient F = [P1 - P0, P2 - P0] M^-1, M = [x1 - x0, x2 - x0], is constant, and
 //!
 //! ```text
@@ -10,12 +11,11 @@
 //! W = sum over triangles of psi det(M) / 2
 //! ```
 //!
-//! W has the unit of an area; multiplied by Young's modulus and the thickness it is the membrane energy.
-//! Moving the material places by dx = H x changes C by -(H'C + C H) and the area by tr H, so that
-//! dW = A (psi I - C S) : H, with Eshelby's stress in brackets. In the frame where C is diagonal the second derivative
-//! separates into a 2 x 2 quadratic form of the stretches (H11, H22) and one of the shears (H12, H21); each is projected
-//! onto the positive semidefinite forms by dropping its negative eigenvalue. For small strain the forms are those of linear
-//! elasticity.
+//! W has the unit of an area; multiplied by Young's modulus and the thickness it is the membrane energy. A movement of
+//! the material positions by dx = H x changes C by -(H'C + C H) and the area by tr H, so that dW = A (psi I - C S) : H,
+//! with Eshelby's stress in brackets. In the frame where C is diagonal the second derivative separates into a 2 x 2
+//! quadratic form of the stretches (H11, H22) and one of the shears (H12, H21). Each is projected onto the positive
+//! semidefinite forms by dropping its negative eigenvalue. For small strain the forms are those of linear elasticity.
 
 use platen_numerics::sparse::Spd;
 use platen_shape::DiskMesh;
@@ -32,18 +32,18 @@ pub(crate) struct Membrane<'a> {
 /// Symmetric 2 x 2 tensor: 11, 22, 12.
 pub(crate) type Sym = [f64; 3];
 
-/// Strain of a triangle and its place on the flat plate.
+/// Strain of a triangle, and its place on the flat plate.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Strained {
     /// Area on the flat plate.
     pub(crate) area: f64,
     /// Green's strain.
     pub(crate) strain: Sym,
-    /// Material place of its centre.
+    /// Material position of its centre.
     pub(crate) centre: [f64; 2],
 }
 
-/// State of one triangle at given material places.
+/// State of one triangle at given material positions.
 pub(crate) struct State {
     /// Area on the flat plate.
     pub(crate) area: f64,
@@ -65,7 +65,7 @@ impl<'a> Membrane<'a> {
         Self { triangles: &mesh.triangles, metrics: mesh.triangles.iter().map(metric).collect(), poisson }
     }
 
-    /// Returns the energy at the material places `x`; infinite when a triangle is inverted.
+    /// Returns the energy at the material positions `x`; infinite if a triangle is inverted.
     pub(crate) fn energy(&self, x: &[[f64; 2]]) -> f64 {
         let mut sum = 0.0;
         for (t, metric) in self.triangles.iter().zip(&self.metrics) {
@@ -77,7 +77,7 @@ impl<'a> Membrane<'a> {
         sum
     }
 
-    /// Adds the derivative of the energy by each material place to `gradient`.
+    /// Adds the derivative of the energy by each material position to `gradient`.
     pub(crate) fn add_gradient(&self, x: &[[f64; 2]], gradient: &mut [[f64; 2]]) {
         for (t, metric) in self.triangles.iter().zip(&self.metrics) {
             let Some(state) = self.state(t, metric, x) else { continue };

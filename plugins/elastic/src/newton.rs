@@ -1,7 +1,7 @@
 //! Newton's method with line search for the minimum of membrane energy plus springs.
 //!
-//! The Hessian changes little on the way, because strains are parts per thousand. Its factor is therefore reused as long as
-//! the steps shrink fast; most plates need only one factorisation.
+//! The Hessian changes little between steps, because strains are parts per thousand. Its factor is therefore reused as
+//! long as the steps shrink fast; most plates need only one factorisation.
 
 use platen_numerics::sparse::{Graph, SparseError, Spd};
 use platen_sdk::{Error, ErrorKind, Result};
@@ -11,18 +11,19 @@ use platen_shape::flatten::plane_picture;
 use crate::boundary_springs::BoundarySprings;
 use crate::membrane::Membrane;
 
-/// Convergence: no vertex moves farther in a full step, metres. A thousandth of the position uncertainty of the best scan.
+/// Convergence: no vertex moves farther in a full step, metres. It is a thousandth of the position uncertainty of the
+/// best scan.
 const TOLERANCE: f64 = 1e-7;
 /// Largest number of steps; four or five are usual, a dozen on a folded mesh.
 const MAX_STEPS: usize = 60;
-/// The Hessian is factored again when a step is longer than this share of the one before.
+/// The Hessian is factored again if a step is longer than this share of the previous one.
 const SLOW: f64 = 0.2;
 /// Armijo's constant: a step that lowers the energy by less than this share of the linear prediction is halved.
 const SUFFICIENT: f64 = 1e-4;
 /// Relative rounding error of the energy.
 const ROUNDING: f64 = 1e-13;
 
-/// Moves the material places `x` to the nearest minimum. `check` is called before each step.
+/// Moves the material positions `x` to the nearest minimum. `check` is called before each step.
 ///
 /// # Errors
 /// When no minimum is found, or `check` fails.
@@ -71,8 +72,8 @@ pub(crate) fn minimise(
     Err(not_found(&format!("no minimum in {MAX_STEPS} steps")))
 }
 
-/// Backtracking line search: returns the largest of 1, 1/2, 1/4 ... that satisfies Armijo's rule without inverting a triangle,
-/// and the energy there. `here` is the energy at `x`.
+/// Backtracking line search: returns the largest of 1, 1/2, 1/4 ... that satisfies Armijo's rule without inverting a
+/// triangle, and the energy there. `here` is the energy at `x`.
 fn line_search(
     energy: impl Fn(&[[f64; 2]]) -> f64,
     here: f64,

@@ -21,7 +21,7 @@ fn harmonic_errors(plate: &ClosedForm) -> [f64; 2] {
     plate.errors(&fixed_boundary(&mesh, &cotangents(&mesh)).unwrap())
 }
 
-/// Mean and largest of the reported uncertainty, metres.
+/// Returns the mean and the largest reported uncertainty, metres.
 fn uncertainty(chart: &Chart) -> [f64; 2] {
     let lengths: Vec<_> = chart.sigma.iter().flatten().map(|s| s[0].hypot(s[1])).collect();
     [lengths.iter().sum::<f64>() / lengths.len() as f64, lengths.iter().copied().fold(0.0, f64::max)]
@@ -33,7 +33,7 @@ fn with_sigma(mut plate: ClosedForm, sigma: f64) -> ClosedForm {
     plate
 }
 
-/// A plate cut out of square, its edges bowed, rolled: the springs act across its real edges, wherever they run.
+/// A plate that was cut out of square, with bowed edges, and rolled: the springs act across its real edges.
 #[test]
 fn a_plate_cut_off_its_rectangle_keeps_its_places() {
     let size = [4.0, 3.0];
@@ -99,7 +99,7 @@ fn on_a_sphere_of_stiff_fibres_the_error_is_the_uncertainty() {
     );
 }
 
-/// Against a minimum found without a mesh. The harmonic map is wrong by a millimetre there.
+/// Comparison with a minimum found without a mesh. The harmonic map is wrong by a millimetre there.
 #[test]
 fn on_a_sphere_of_least_energy_it_is_right() {
     for (radius, size) in [(10.0, [2.5, 5.0]), (8.0, [3.0, 2.5]), (15.0, [5.0, 2.5])] {
@@ -113,8 +113,8 @@ fn on_a_sphere_of_least_energy_it_is_right() {
     }
 }
 
-/// The strain of a sphere of stiff fibres is known: none along the fibres, shrunk across them. The reported strain differs by
-/// the law, but its incompatibility does not: any law has the sphere's Gaussian curvature.
+/// The strain of a sphere of stiff fibres is known: none along the fibres, shrinkage across them. The reported strain
+/// differs by the material law, but its incompatibility does not: any law has the sphere's Gaussian curvature.
 #[test]
 fn the_strain_is_compatible_with_the_curvature_of_the_sphere() {
     let (radius, size, n) = (10.0, [2.5, 2.5], 40);
@@ -137,7 +137,7 @@ fn the_strain_is_compatible_with_the_curvature_of_the_sphere() {
     assert!((owed * radius * radius + 1.0).abs() < 0.023, "{} of -K", owed * radius * radius);
 }
 
-/// The outline lies 0.2 mm too far inside on all sides: on a rolled plate its own measures set that right.
+/// The outline lies 0.2 mm too far inside on all sides: on a rolled plate its own dimensions correct this.
 #[test]
 fn a_wrong_inset_is_shared_by_the_edges() {
     let (size, inset) = ([3.0, 2.5], 2e-4);
@@ -179,7 +179,8 @@ fn it_stops_at_cancellation() {
     assert_eq!(stopped.unwrap_err(), stop());
 }
 
-/// Small meshes of every kind: noise up to the size of the cells. No panic, every number finite, no inverted triangle.
+/// Small meshes of every kind, with noise up to the size of the cells: no panic, every number finite, no inverted
+/// triangle.
 #[test]
 fn random_small_meshes_give_charts_or_are_refused() {
     let mut refused = 0;
@@ -212,7 +213,7 @@ fn random_small_meshes_give_charts_or_are_refused() {
     assert!(refused < 370, "{refused} refused");
 }
 
-/// Green's strain at every vertex.
+/// Returns Green's strain at every vertex.
 fn strain(plate: &ClosedForm, chart: &Chart) -> Vec<[f64; 3]> {
     let mesh = plate.mesh().unwrap();
     strain_of_vertices(&mesh, &Membrane::new(&mesh, 0.3).strains(&chart.uv))

@@ -1,4 +1,4 @@
-//! Time of the harmonic map by number of vertices: a 4 x 4 m plate rolled to R 12 m, jittered, Delaunay.
+//! Benchmark of the harmonic map by number of vertices: a 4 x 4 m plate rolled to R 12 m, jittered, Delaunay.
 
 use divan::Bencher;
 use platen_shape::flatten::closed_form::{ClosedForm, cylinder};

@@ -1,12 +1,12 @@
 //! Flattening `harmonic`: fixed-boundary harmonic map with cotangent weights.
 //!
-//! The second flattening method of Masuda et al., "Point-based shape monitoring of plate bending for large-scale storage
-//! tanks" (section 4.3, equation 4), and the faster of the two. It assigns each vertex of the mid-surface mesh its place
-//! (u, v) on the flat plate.
+//! This is the second flattening method of Masuda et al., "Point-based shape monitoring of plate bending for
+//! large-scale storage tanks" (section 4.3, equation 4), and the faster of the two. It assigns to each vertex of the
+//! mid-surface mesh its position (u, v) on the flat plate.
 //!
 //! # Method
 //!
-//! The boundary vertices are fixed at the places that the mesh gives for them: on the outline of the plate, at their
+//! The boundary vertices are fixed at the positions that the mesh gives for them: on the outline of the plate, at their
 //! share of the edge's arc length. The interior vertices minimise the discrete Dirichlet energy
 //!
 //! ```text
@@ -14,8 +14,8 @@
 //! ```
 //!
 //! where a_ij and b_ij are the angles opposite edge ij in its two triangles (Pinkall, Polthier, "Computing discrete
-//! minimal surfaces and their conjugates", 1993). The normal equations are symmetric positive definite; one sparse Cholesky
-//! factorisation serves both coordinates.
+//! minimal surfaces and their conjugates", 1993). The normal equations are symmetric positive definite; one sparse
+//! Cholesky factorisation serves both coordinates.
 //!
 //! # Accuracy and limits
 //!
@@ -25,8 +25,8 @@
 //! | sphere of R 10 m, 5 x 2.5 m | systematic, about 1 mm in the mean |
 //! | double curvature in general | systematic, 0.4 to 2 mm: the map preserves angles, the plate preserves lengths; use `elastic` |
 //!
-//! An error in the place of an edge, or in the arc length along it, enters the interior undamped. The chart contains
-//! no uncertainty of its own; the host counts its distance from an elastic membrane.
+//! An error in the position of an edge, or in the arc length along it, enters the interior undamped. The chart contains
+//! no uncertainty of its own; the host adds its distance from an elastic membrane to the uncertainty.
 //!
 //! # Example
 //!
@@ -41,8 +41,8 @@
 //!
 //! # Errors
 //!
-//! Refused are: a triangle of zero area; a triangle with all three corners on one edge of the plate; edges whose lengths
-//! differ from the sides of the rectangle by more than a tenth.
+//! Refused are: a triangle of zero area; a triangle with all three corners on one edge of the plate; edges whose
+//! lengths differ from the sides of the rectangle by more than a tenth.
 
 use platen_numerics::cache_sizes;
 use platen_numerics::sparse::SparseError;

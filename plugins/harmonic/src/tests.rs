@@ -4,7 +4,7 @@ use platen_shape::Vec3;
 use platen_shape::flatten::closed_form::*;
 use platen_shape::flatten::{check_fit, first_turned};
 
-/// Mean and largest error of the map on a plate, metres.
+/// Returns the mean and the largest error of the map on a plate, metres.
 fn errors(plate: &ClosedForm) -> [f64; 2] {
     plate.errors(&harmonic(&plate.mesh().unwrap()).unwrap())
 }
@@ -42,8 +42,8 @@ fn a_half_bent_plate_is_exact() {
     assert!(errors(&plate)[1] < 4e-6, "{:?}", errors(&plate));
 }
 
-/// The known systematic error on R 10 m, 2.5 x 5 m: 0.65 to 1.3 mm in the mean, after the material's law. With fibres
-/// that keep their length across the plate it is the lower one.
+/// Known systematic error on R 10 m, 2.5 x 5 m: 0.65 to 1.3 mm in the mean, depending on the material's law. With
+/// fibres that keep their length across the plate it is the lower one.
 #[test]
 fn on_a_sphere_it_is_wrong_by_a_millimetre() {
     let size = [2.5, 5.0];
@@ -70,7 +70,7 @@ fn turn_and_shift() -> impl Fn(Vec3) -> Vec3 {
     move |p| Vec3::new(cos * p.z - sin * p.x + 4.0, p.y - 7.0, cos * p.x + sin * p.z + 1.0)
 }
 
-/// Small meshes of every kind: noise up to the size of the cells. No panic, every coordinate finite.
+/// Small meshes of every kind, with noise up to the size of the cells: no panic, every coordinate finite.
 #[test]
 fn random_small_meshes_give_finite_charts_or_are_refused() {
     let mut refused = 0;

@@ -1,12 +1,15 @@
-//! Advisor `line-bends`: the next bend along a line, from the plate's target to its last stroke. The method is this project's own; see
-//! `core/advice`.
+//! Advisor `line-bends`: the next bend along a line, derived from the plate's target and its strokes up to the last
+//! one.
+//!
+//! The method is this project's own; see `core/advice`.
 //!
 //! # Method
 //!
-//! On cylinder and cone every bend runs along a straight line of the target and adds a ramp to the plate's height over it. The fewest
-//! bends, none backwards, under which all templates pass are planned anew after each stroke; the depth of the next one follows from
-//! three-point bending with springback, corrected by what the strokes of this plate and of like plates taught. On spheres and tori the place
-//! and direction of the next bend are told.
+//! On a cylinder and a cone every bend runs along a straight line of the target and adds a ramp to the plate's height
+//! over it. After each stroke the plan is made again: it is the smallest number of bends, none of them backwards, after
+//! which all templates pass. The depth of the next bend is computed from three-point bending with springback, and
+//! corrected by what was learned from the strokes of this plate and of earlier plates of its class. On spheres and tori
+//! the advice is the position and direction of the next bend.
 //!
 //! # Example
 //!
@@ -26,13 +29,14 @@
 //! | key | unit | default | range | meaning |
 //! |---|---|---|---|---|
 //! | `angle_max_deg` | deg | target's curvature x 300 mm, at most 3 | 0.2 to 20 | largest bend of one stroke |
-//! | `strain_max_percent` | % | 5 | 0.5 to 30 | largest strain of the face under the bends on record, by the thickness and the die's `punch_radius_mm`; beyond it no bend is advised there |
+//! | `strain_max_percent` | % | 5 | 0.5 to 30 | largest strain of the face under the recorded bends, by the thickness and the die's `punch_radius_mm`; above it no bend is advised there |
 //! | `order` | | `onward` | `onward`, `ends_in` | from the last bend onward, or from both ends to the middle |
-//! | `depth` | | `true` | | tell a depth; needs the die's opening and a press that tells its depth (`ram_depth`) |
+//! | `depth` | | `true` | | advise a depth; requires the die's opening and a press that reports its depth (`ram_depth`) |
 //!
 //! # Limits and errors
 //!
-//! No depth without `[[die]]`; no angle on double curvature. The guard against bending too far counts on the templates of the plate file.
+//! There is no depth without `[[die]]`, and no angle on double curvature. The guard against bending too far depends on
+//! the templates of the plate file.
 
 use platen_advice::{Order, Settings, advise_on_surfaces};
 use platen_model::{Advice, Step};
@@ -55,7 +59,7 @@ platen_sdk::options! {
 
 struct LineBends(Options);
 
-/// Feed of a shop that bends as much as it may, metres, and the largest bend without an option, radians.
+/// Feed of a shop that makes the largest permitted bends, metres, and the largest bend without an option, radians.
 const FEED: f64 = 0.3;
 const LARGEST: f64 = 0.0524;
 

@@ -1,8 +1,13 @@
-//! Deviation of the plate from the whole target at every node, with its uncertainty: least-squares rigid fit, then the target in its seat.
+//! Deviation of the plate from the whole target at every node, with its uncertainty: least-squares rigid fit, then
+//! one-sided contact of the target.
 //!
-//! The uncertainty is that of [`Trials`], each with a seat of its own. It holds the difference to other seats: on the whole fitted surface where a part
-//! of it was not seen, and those in which the middle of the target lies higher by no more than the trials' seats do. A half-bent plate has such seats, as
-//! its target lies on a ridge; more than the noise of the scan decides whether it rocks there.
+//! The uncertainty is that of [`Trials`], in each of which the target has its own seat. It is extended by the
+//! difference to other possible seats:
+//!
+//! - the seat on the whole fitted surface, if a part of it was not seen;
+//! - the seats in which the middle of the target lies higher by no more than the seats of the trials do. A half-bent
+//!   plate has such seats, as its target lies on a ridge; whether it rocks there does not depend on the noise of the
+//!   scan alone.
 
 use nalgebra::Matrix3;
 use platen_sdk::{PlateGrid, Result};
@@ -15,24 +20,24 @@ use crate::trials::{TRIALS, Trials, half_width};
 /// Target in its seat on the plate.
 #[derive(Debug)]
 pub(crate) struct Deviation {
-    /// Places, v outer, u inner.
+    /// Nodes, v outer, u inner.
     pub(crate) uv: Vec<[f64; 2]>,
-    /// Measured minus target along the target's normal, metres, positive towards the scanner. Never above zero where the
-    /// plate was seen.
+    /// Measured minus target along the target's normal, metres, positive towards the scanner. It is never above zero
+    /// where the plate was seen.
     pub(crate) value: Vec<f64>,
-    /// The same in the best fit of all material points, of both signs.
+    /// The same in the best fit of all material points, with both signs.
     pub(crate) fitted: Vec<f64>,
-    /// The plate was seen there.
+    /// Whether the plate was seen there.
     pub(crate) seen: Vec<bool>,
-    /// The target rocks on the plate.
+    /// Whether the target rocks on the plate.
     pub(crate) rocks: bool,
     contacts: Vec<usize>,
     pose: Pose,
     /// Movement to the seat in each trial.
     tried: [Vec3; TRIALS],
-    /// Movements to other seats that the plate's uncertainty does not tell from this one.
+    /// Movements to other seats that cannot be distinguished from this one within the plate's uncertainty.
     other: Vec<Vec3>,
-    /// Seat on the whole plate where a part of it was not seen: the surface continues there.
+    /// Seat on the whole fitted surface if a part of it was not seen: the fit continues the surface there.
     whole: Option<Pose>,
 }
 
@@ -48,7 +53,7 @@ impl Deviation {
     /// Lays the target on the plate.
     ///
     /// # Errors
-    /// [`ErrorKind::BadData`] when the visible part of the plate does not support the target; the error of `check`.
+    /// [`ErrorKind::BadData`] if the visible part of the plate does not support the target; the error of `check`.
     pub(crate) fn new(
         now: &Surface,
         target: &TargetSurface,
@@ -86,8 +91,8 @@ impl Deviation {
         self.pose.deviation(now, target, at)
     }
 
-    /// Returns the standard deviation of the deviation at a place, from the fit's covariance and the scanner's
-    /// errors there and at the contacts; at least that of the trials. The interval reaches as far beyond the deviation in any other seat
+    /// Returns the standard deviation of the deviation at a place, from the fit's covariance and the scanner's errors
+    /// there and at the contacts; at least that of the trials. The interval includes the deviation in every other seat
     /// that the plate's uncertainty allows, and in the seat on the whole plate.
     pub(crate) fn sigma(
         &self,

@@ -8,19 +8,20 @@ use crate::scanner_sigma::ScannerSigma;
 use crate::section::{Chord, Line, Section};
 use crate::trials::{TRIALS, Trials, half_width};
 
-/// A template whose sagitta is less than this counts as straight, metres: no template is cut finer.
+/// A template with a smaller sagitta counts as straight, metres: no template is cut more precisely.
 const STRAIGHT: f64 = 0.1e-3;
 
-/// Places under a template: 1 cm apart for a chord of 2 m.
+/// Number of points under a template: 1 cm apart for a chord of 2 m.
 pub(crate) const PLACES: usize = 201;
 
-/// Places under a template that is slid over the whole plate for a figure without a verdict.
+/// Number of points under a template that is slid over the whole plate for a figure without a verdict.
 pub(crate) const FEW_PLACES: usize = 41;
 
 /// Step of the search as a share of the chord.
 const SEARCH_STEP: f64 = 0.0125;
 
-/// Distances from the worst place, steps of the search, at which it is sought more finely, and beside it in each trial.
+/// Distances from the worst position, in steps of the search, at which it is searched more finely, and beside it in
+/// each trial.
 const FINE: [f64; 5] = [0.2, 0.4, 0.6, 0.8, 1.0];
 const BESIDE: [f64; 8] = [0.2, 0.4, 0.6, 0.8, 1.0, 2.0, 3.0, 4.0];
 
@@ -43,7 +44,7 @@ pub(crate) struct Evaluated {
     pub(crate) radius: Option<f64>,
     /// Sagitta of the plate under the template.
     pub(crate) sagitta: f64,
-    /// Places of the gap profile.
+    /// Points of the gap profile.
     pub(crate) places: Vec<[f64; 2]>,
     line: Line,
     seated: Seated,
@@ -53,10 +54,10 @@ pub(crate) struct Evaluated {
 /// Gaps of a trial.
 #[derive(Debug)]
 struct TriedGaps {
-    /// Places of the gaps along the line, metres.
+    /// Positions of the gaps along the line, metres.
     along: Vec<f64>,
     gaps: Vec<f64>,
-    /// Size of the largest.
+    /// Size of the largest gap.
     largest: f64,
 }
 
@@ -156,7 +157,7 @@ impl Evaluator<'_> {
         }
     }
 
-    /// Returns the gap at a place of the profile with its 95 % uncertainty, metres.
+    /// Returns the gap at a point of the profile with its 95 % uncertainty, metres.
     pub(crate) fn gap_at(&self, evaluated: &Evaluated, place: usize) -> [f64; 2] {
         let Evaluated { line, seated, tried, .. } = evaluated;
         let (gap, at) = (seated.gaps[place], seated.section.along[place]);
@@ -164,8 +165,8 @@ impl Evaluator<'_> {
         [gap, self.uncertainty(line, seated, place, departures)]
     }
 
-    /// Slides a template along the whole line; returns the middle of the position with the largest gap, and that gap. Where a template is
-    /// about to rock, fewer than [`PLACES`] may let it lie still.
+    /// Slides a template along the whole line; returns the middle of the position with the largest gap, and that gap.
+    /// If a template is about to rock, fewer points than [`PLACES`] may show it at rest.
     pub(crate) fn worst(&self, line: &Line, chord: f64, seat: Seat, n_places: usize) -> (f64, f64) {
         let (first, last) = (0.5 * chord, (line.length - 0.5 * chord).max(0.5 * chord));
         let n_steps = ((last - first) / (SEARCH_STEP * chord)).ceil() as usize;
@@ -173,14 +174,14 @@ impl Evaluator<'_> {
         self.worst_of(centres, line, chord, seat, n_places, (first, f64::NEG_INFINITY))
     }
 
-    /// Returns the middle of the position with the largest gap, sought once more between the steps of [`Self::worst`]: there the gap grows until the
-    /// template falls on another contact.
+    /// Returns the middle of the position with the largest gap, refined between the steps of [`Self::worst`]. There the
+    /// gap grows until the template falls on another contact.
     fn worst_finely(&self, line: &Line, chord: f64, seat: Seat) -> f64 {
         let worst = self.worst(line, chord, seat, PLACES);
         self.worst_of(beside(line, chord, worst.0, &FINE), line, chord, seat, PLACES, worst).0
     }
 
-    /// Returns that of the centres with the largest gap, and the gap; `worst` where none has a larger one.
+    /// Returns the centre with the largest gap, and the gap; `worst` if no centre has a larger one.
     fn worst_of(
         &self,
         centres: impl Iterator<Item = f64>,
@@ -205,9 +206,11 @@ impl Evaluator<'_> {
         Seated { seating, rocks, largest: largest(&gaps), gaps, section }
     }
 
-    /// Returns the 95 % uncertainty of the gap at a place: in this seat the fit's covariance at the places that decide the gap, the correlated
-    /// error of a single scan, taken as independent between those places, and the scanner's bias; at least that of the trials, whose gaps
-    /// depart so far. Where the template is about to rock, or to fall on another contact, the gap jumps, and weights say nothing of the other side.
+    /// Returns the 95 % uncertainty of the gap at a point. In this seat it consists of the fit's covariance at the
+    /// points that determine the gap, of the correlated error of a single scan, assumed to be independent between those
+    /// points, and of the scanner's bias. It is at least that of the trials, of which `departures` are the differences
+    /// of the gap. If the template is about to rock, or to fall on another contact, the gap jumps, and the weights do
+    /// not show the other side of the jump.
     fn uncertainty(&self, line: &Line, seated: &Seated, place: usize, departures: [f64; TRIALS]) -> f64 {
         let term = |(k, weight): (usize, f64)| {
             let [u, v] = line.at(seated.section.along[k]);
@@ -220,8 +223,8 @@ impl Evaluator<'_> {
         in_seat.max(half_width(departures).hypot(EXPANDED * self.scanner.of_gap()))
     }
 
-    /// Returns the gaps of the trials, each with the template at that of the centres where its gap is largest: a template that slides along its line
-    /// has no seat that noise could change, but another worst place.
+    /// Returns the gaps of the trials, in each with the template at the centre where its gap is largest: for a template
+    /// that slides along its line, noise changes the worst position rather than the seat.
     fn try_seats(&self, template: &Template, line: &Line, centres: &[f64]) -> [TriedGaps; TRIALS] {
         let mut tried = std::array::from_fn(|_| TriedGaps {
             along: Vec::new(),
@@ -253,8 +256,8 @@ impl Evaluator<'_> {
         tried
     }
 
-    /// Returns the meaning of the gap and its sense: -1 not bent enough, 1 bent too far. A template that bridges the gap rests
-    /// on a plate that is more hollow than the template; one that overhangs the gap, on a plate that is less hollow.
+    /// Returns the meaning of the gap and its sense: -1 not bent enough, 1 bent too far. If the template bridges the
+    /// gap, the plate is more hollow than the template; if the template overhangs the gap, the plate is less hollow.
     fn sense(&self, seated: &Seated) -> (&'static str, i8) {
         let hollow = seated.open() == Opening::BetweenContacts;
         let sagitta = seated.section.target_sagitta;
@@ -266,7 +269,8 @@ impl Evaluator<'_> {
 }
 
 impl TriedGaps {
-    /// Returns the gap at the place that is nearest to a distance along the line, metres; `NaN` on a plate of no finite heights.
+    /// Returns the gap at the point nearest to a distance along the line, metres; `NaN` on a plate without finite
+    /// heights.
     fn at(&self, distance: f64) -> f64 {
         let after = self.along.partition_point(|s| *s < distance);
         let nearest = match after {
@@ -279,7 +283,7 @@ impl TriedGaps {
     }
 }
 
-/// Returns the centres at these distances to either side of the worst one, steps of the search.
+/// Returns the centres at these distances to either side of the worst one, in steps of the search.
 fn beside(line: &Line, chord: f64, worst: f64, steps: &[f64]) -> impl Iterator<Item = f64> {
     let (first, last) = (0.5 * chord, line.length - 0.5 * chord);
     let steps = steps.iter().flat_map(|step| [-step, *step]);
@@ -288,7 +292,8 @@ fn beside(line: &Line, chord: f64, worst: f64, steps: &[f64]) -> impl Iterator<I
         .filter(move |centre| (first..=last).contains(centre))
 }
 
-/// Gaps that differ by less than this are equal, metres: of equal gaps the first counts, independent of rounding.
+/// Gaps that differ by less than this count as equal, metres: the first of equal gaps is taken, independent of
+/// rounding.
 const TIE: f64 = 1e-9;
 
 fn largest(gaps: &[f64]) -> usize {
@@ -299,7 +304,7 @@ impl Seated {
     fn open(&self) -> Opening {
         let contacts = self.section.profile.contacts(&self.seating);
         let between = |k: usize| contacts.first() < Some(&k) && Some(&k) < contacts.last();
-        // Under a held template, whose ends touch, the plate may also stand above the edge.
+        // Under a held template, whose ends touch, the plate may also rise above the edge.
         match between(self.largest) && self.gaps[self.largest] > 0.0 {
             true => Opening::BetweenContacts,
             false => Opening::BeyondContacts,
@@ -321,7 +326,7 @@ impl Seated {
     }
 }
 
-/// Returns the place in words, along the direction in which the line mainly runs.
+/// Returns the position as text, along the direction in which the line mainly runs.
 fn from_edge(line: &Line, at: [f64; 2]) -> String {
     let [along_u, along_v] = line.direction();
     if along_u.abs() >= along_v.abs() {

@@ -1,4 +1,4 @@
-//! Named figures, as in the press's register map.
+//! Named figures of the comparison, as in the press's register map.
 
 use platen_model::{Figure, Quantity, Task};
 use platen_shape::{EXPANDED, Surface, TargetSurface};
@@ -6,14 +6,15 @@ use platen_shape::{EXPANDED, Surface, TargetSurface};
 use crate::deviation::Deviation;
 use crate::evaluation::{Evaluated, Evaluator};
 
-/// Templates whose distances from a station differ by less than this cross there, metres: half the usual distance of places under a template.
+/// Templates whose distances from a station differ by less than this cross there, metres: half the usual distance of
+/// points under a template.
 const CROSSING: f64 = 5e-3;
 
 /// Nodes along each side for the mean curvature, those of the result's grid.
 const GRID: usize = 21;
 
-/// Returns the figures of the whole plate's deviation: from the best-fitting target, whose two extremes measure the difference
-/// of the shapes, and from the target in its seat.
+/// Returns the figures of the whole plate's deviation: from the best-fitting target, whose two extremes measure the
+/// difference of the shapes, and from the target in its seat.
 pub(crate) fn of_deviation(
     deviation: &Deviation,
     evaluator: &Evaluator<'_>,
@@ -36,7 +37,7 @@ pub(crate) fn of_deviation(
         .copied()
         .fold(min, |deepest, i| if deviation.value[i] < deviation.value[deepest] { i } else { deepest });
 
-    // The best fit depends on all places: its uncertainty is negligible beside that of one place.
+    // The best fit depends on all points: its uncertainty is negligible compared with that of one point.
     let placed = |name: &str, i: usize| {
         let [u, v] = deviation.uv[i];
         let figure = Figure::new(name, deviation.fitted[i], "m");
@@ -64,7 +65,8 @@ pub(crate) fn of_deviation(
     figures
 }
 
-/// Returns the figures of the template with the largest gap relative to its limit, and each template's radius, sagitta and play.
+/// Returns the figures of the template with the largest gap relative to its limit, and each template's radius, sagitta
+/// and play.
 pub(crate) fn of_templates(evaluated: &[Evaluated]) -> Vec<Figure> {
     let share = |j: &Evaluated| j.finding.max_gap.abs() / j.finding.limit;
     let Some(worst) =
@@ -90,8 +92,8 @@ pub(crate) fn of_templates(evaluated: &[Evaluated]) -> Vec<Figure> {
     figures
 }
 
-/// Returns the mean curvature of the plate in the direction of bending, relative to the target's, minus one: -0.1 is a tenth
-/// too little. `None` for a flat target.
+/// Returns the mean curvature of the plate in the direction of bending, relative to the target's, minus one: -0.1 is a
+/// tenth too little. `None` for a flat target.
 pub(crate) fn of_curvature(now: &Surface, target: &TargetSurface) -> Option<Figure> {
     let (mut is, mut wanted) = (0.0, 0.0);
     for i in 0..GRID * GRID {
@@ -149,8 +151,8 @@ pub(crate) fn of_stations(
     figures
 }
 
-/// Returns the curvatures of plate and target in the target's direction of bending, positive the way the target bends; the
-/// mean curvature where the target has no such direction.
+/// Returns the curvatures of plate and target in the target's direction of bending, positive in the sense in which the
+/// target bends; the mean curvature if the target has no such direction.
 fn bending(now: &Surface, target: &TargetSurface, [u, v]: [f64; 2]) -> [f64; 2] {
     let goal = target.curvature(u, v);
     let direction = target.bending(u, v);
@@ -160,7 +162,7 @@ fn bending(now: &Surface, target: &TargetSurface, [u, v]: [f64; 2]) -> [f64; 2] 
     })
 }
 
-/// Returns the template that is nearest to `station`, the first of several that cross there, and the nearest place under it.
+/// Returns the template nearest to `station` (the first of several that cross there) and the nearest point under it.
 fn nearest_place(station: [f64; 2], evaluated: &[Evaluated]) -> Option<(&Evaluated, usize)> {
     let nearest = |template: &Evaluated| {
         let distance = |k: usize| {

@@ -1,13 +1,14 @@
 //! Comparison `template`: the gap under a template, by one-sided contact, and the deviation from the whole target.
 //!
-//! A template is a gauge whose edge is the target's section along a reference line, `chord_mm` long. Shops check a bent plate
-//! by laying it on the plate and measuring the gap. This comparison computes that contact on the fitted surface: a rigid
-//! body resting on the plate, not a best fit. The method is this project's own.
+//! A template is a gauge whose edge is the target's section along a reference line, `chord_mm` long. Shops check a bent
+//! plate by laying the template on the plate and measuring the gap. This comparison computes that contact on the fitted
+//! surface. It models a rigid body that rests on the plate, not a best fit. The method is this project's own.
 //!
 //! # Method
 //!
-//! *Seat of a template.* With x along the template from its middle and d(x) the height of the plate over the template's edge
-//! in the section plane, the template rests on the lowest line a + b x >= d(x), and the gap is a + b x - d(x). The seats:
+//! *Seat of a template.* Let x be the distance along the template from its middle, and d(x) the height of the plate
+//! over the template's edge in the section plane. The template rests on the lowest line a + b x >= d(x), and the gap is
+//! a + b x - d(x). The seats are:
 //!
 //! | `seat` in the plate file | position of the template |
 //! |---|---|
@@ -15,30 +16,40 @@
 //! | `balanced` | equal gaps at both ends, one contact |
 //! | `held` | both ends set on the plate; the gap has a sign |
 //!
-//! *Verdict.* The gap passes or fails its limit only outside its 95 % uncertainty
+//! *Verdict.* The gap passes or fails its limit only if it differs from the limit by more than its 95 % uncertainty
 //!
 //! ```text
 //! U = 1.96 sqrt(s_fit^2 + s_corr^2 w'w / 2 + s_true^2)
 //! ```
 //!
-//! where s_fit is the fit's standard deviation of w'z, the heights z at the places that decide the gap with their weights w
-//! and covariances; s_corr the plant's correlated error of a position, its share of a single scan; s_true the scanner's error of a gap on a known artefact.
-//! U is at least what a Monte Carlo method finds (JCGM 101:2008): 64 plates that differ from the measured one by drawn errors of the fit and
-//! a wave of s_corr over the range, of any phase and a period of 0.8 to 1.4 m, each with the template in its own seat; the half width
-//! that holds 95 % of their gaps. About to rock, or to fall on another contact, a template has either of two gaps, which w does not tell.
-//! The uncertainties of deviations hold the same for the whole target; that of the places
-//! (u, v) themselves is not in them. Where a part of the plate was not seen, they hold what the seat on the whole surface, as the fit continues
-//! it there, would change.
-//! A contact or the largest gap in an area that was not seen gives `cannot_tell`. With several templates the figures
-//! `gap.*` are those of the one with the largest gap relative to its limit. The uncertainties of deviations and stations hold the same errors;
-//! that of a curvature the second derivative of a correlated error whose period is 1 m of range.
+//! where
 //!
-//! *Seat of the target.* The whole target is laid on the plate as a rigid surface, from the scanner's side. Its direction
-//! follows the least-squares rigid fit of all material points; its height and tilts solve the linear program "lowest over the
-//! middle of the plate, nowhere through the plate". The field `deviation` is measured minus target along the target's normal in
-//! that seat, so no value is above zero; `deviation.gap` is the largest opening under the target and `in_tolerance` the share of
-//! the plate within the tolerance. The pair `deviation.max`, `deviation.min` of the press, with `.rms` and `.p95`, refers to
-//! the best fit instead, which has deviations of both signs.
+//! - s_fit is the fit's standard deviation of w'z; z are the heights at the points that determine the gap, w their
+//!   weights, with their covariances;
+//! - s_corr is the plant's correlated error of a position for a pair of scans, of which a single scan has half the
+//!   variance;
+//! - s_true is the scanner's error of a gap on a known artefact.
+//!
+//! U is at least the value of a Monte Carlo method (JCGM 101:2008). It uses 64 plates that differ from the measured one
+//! by drawn errors of the fit and by a wave of s_corr over the range, of any phase and a period of 0.8 to 1.4 m. On
+//! each of them the template has its own seat. The value is the half width that contains 95 % of their gaps. A template
+//! that is about to rock, or to fall on another contact, has either of two gaps; the weights w do not show this.
+//!
+//! The uncertainties of deviations contain the same errors for the whole target. They do not contain the uncertainty of
+//! the positions (u, v) themselves. If a part of the plate was not seen, they also contain the change of the seat on
+//! the whole surface, as the fit continues it there. The uncertainties of stations contain the same errors; that of a
+//! curvature contains the second derivative of a correlated error whose period is 1 m of range.
+//!
+//! A contact or the largest gap in an area that was not seen gives `cannot_tell`. With several templates the figures
+//! `gap.*` are those of the template with the largest gap relative to its limit.
+//!
+//! *Seat of the target.* The whole target is laid on the plate as a rigid surface, from the scanner's side. Its
+//! direction is that of the least-squares rigid fit of all material points. Its height and tilts solve the linear
+//! program "lowest over the middle of the plate, nowhere through the plate". The field `deviation` is measured minus
+//! target along the target's normal in that seat, so no value is above zero. `deviation.gap` is the largest opening
+//! under the target, and `in_tolerance` the share of the plate within the tolerance. The pair `deviation.max`,
+//! `deviation.min` of the press, with `.rms` and `.p95`, refers to the best fit instead, which has deviations of both
+//! signs.
 //!
 //! # Example
 //!
@@ -73,9 +84,9 @@
 //!
 //! # Limits and errors
 //!
-//! Sideways curvature of an oblique line (a helix) is dropped, as a straight template drops it. Refused are: a target with an
-//! impossible radius; a template on an unknown line, longer than its line, or beyond an end of it; a line that leaves the plate;
-//! a plate that was seen on one side of its middle only.
+//! Sideways curvature of an oblique line (a helix) is ignored, as with a real straight template. Refused are: a target
+//! with an impossible radius; a template on an unknown line, longer than its line, or beyond an end of it; a line that
+//! leaves the plate; a plate that was seen on one side of its middle only.
 
 mod deviation;
 mod evaluation;
@@ -108,7 +119,7 @@ platen_sdk::options! {
 
 struct TemplateGap(Options);
 
-/// Rounding allowed for places on the edge of the plate, metres.
+/// Rounding allowed for points on the edge of the plate, metres.
 const ON_EDGE: f64 = 1e-6;
 
 impl Comparison for TemplateGap {
@@ -212,7 +223,7 @@ fn on_line(task: &Task, template: &Template) -> Result<(Line, Centre)> {
     Ok((on_plate, template.centre))
 }
 
-/// Returns one sentence per template, the worst first.
+/// Returns one sentence for each template, the worst first.
 fn says(evaluated: &[Evaluated]) -> Vec<String> {
     if evaluated.is_empty() {
         return vec!["cannot tell: the plate file names no template".into()];
@@ -225,7 +236,8 @@ fn says(evaluated: &[Evaluated]) -> Vec<String> {
     order.iter().map(|j| format!("{}: {}", j.finding.name, j.finding.says)).collect()
 }
 
-/// Slides a template over the whole plate: the worst gap along u and along v, and a sentence when it exceeds the limit.
+/// Slides a template over the whole plate: reports the worst gap along u and along v, and a sentence if it exceeds the
+/// limit.
 fn search(
     evaluator: &Evaluator<'_>,
     task: &Task,

@@ -1,8 +1,9 @@
-//! Linear program in three unknowns by the dual simplex method: the one-sided seat of a rigid surface.
+//! Linear program in three unknowns by the dual simplex method, for the one-sided seat of a rigid surface.
 //!
-//! Minimises c . q over q in R^3, c_1 = 1, subject to r_i . q >= d_i for all i. Three constraints form the basis and hold as equalities;
-//! the most violated constraint enters, and the one leaves that keeps the multipliers non-negative (ratio test). The objective
-//! rises in every round, so the method ends. The solution is exact; 10,000 constraints take tens of rounds.
+//! It minimises c . q over q in R^3, c_1 = 1, subject to r_i . q >= d_i for all i. Three constraints form the basis and
+//! hold as equalities. In each round the most violated constraint enters, and the one leaves that keeps the multipliers
+//! non-negative (ratio test). The objective increases in every round, so the method ends. The solution is exact; 10,000
+//! constraints take tens of rounds.
 
 use nalgebra::Matrix3;
 use platen_shape::Vec3;
@@ -19,18 +20,19 @@ pub(crate) struct Vertex {
 /// Violations below this count as rounding, metres.
 const ROUNDING: f64 = 1e-12;
 
-/// The objective is moved off by this, metres: where a constraint lies exactly under the middle, as a contact in the middle of the plate does, two
-/// multipliers would be 0, the objective would not rise, and the method would cycle (perturbation against degeneracy; Charnes, Econometrica 20, 1952).
+/// The objective is shifted by this, metres. If a constraint lies exactly under the middle, as a contact in the middle
+/// of the plate does, two multipliers would be 0, the objective would not increase, and the method would cycle
+/// (perturbation against degeneracy; Charnes, Econometrica 20, 1952).
 const PERTURBATION: [f64; 2] = [1e-7, 0.618e-7];
 
 /// Largest number of rounds, far more than needed.
 const ROUNDS: usize = 1000;
 
-/// Returns the minimum; `None` when the program is unbounded (all constraints on one side of the middle) or has fewer than
-/// three constraints.
+/// Returns the minimum; `None` when the program is unbounded (all constraints on one side of the middle) or has fewer
+/// than three constraints.
 ///
-/// `reach` is a length much larger than the lever arms of the constraints and of the objective. The active constraints of a
-/// program that is alike are a good `start`; it counts where it is dual feasible.
+/// `reach` is a length much larger than the lever arms of the constraints and of the objective. The active constraints
+/// of a similar program are a good `start`; it is used if it is dual feasible.
 pub(crate) fn minimum(
     objective: Vec3,
     rows: &[Vec3],
@@ -38,7 +40,8 @@ pub(crate) fn minimum(
     reach: f64,
     start: Option<[usize; 3]>,
 ) -> Option<Vertex> {
-    // Without a start: three artificial constraints far outside and far below. A bounded program drops all of them.
+    // Without a start, three artificial constraints far outside and far below are used. A bounded program drops all of
+    // them.
     let deep = -reach;
     let artificial = [0.0, 2.0, 4.0].map(|k: f64| {
         let (sin, cos) = (k * std::f64::consts::PI / 3.0).sin_cos();
@@ -76,7 +79,7 @@ pub(crate) fn minimum(
 mod tests {
     use super::*;
 
-    /// Rows (1, x, y) over a grid with heights f.
+    /// Returns rows (1, x, y) over a grid with heights f.
     fn over_grid(n: usize, f: impl Fn(f64, f64) -> f64) -> (Vec<Vec3>, Vec<f64>) {
         let at = |k: usize| 2.0 * k as f64 / (n - 1) as f64 - 1.0;
         let places = (0..n * n).map(|k| (at(k % n), at(k / n)));
@@ -99,7 +102,7 @@ mod tests {
 
     #[test]
     fn no_plane_above_all_places_is_lower_in_the_middle() {
-        // Against all triples of places that surround the middle: the highest of their planes there.
+        // Comparison with all triples of points that surround the middle: the highest of their planes there.
         let f = |x: f64, y: f64| 0.02 * (3.0 * x + 1.0).sin() * (2.0 * y).cos() + 0.005 * x * y;
         let (rows, d) = over_grid(7, f);
         let mut highest = f64::NEG_INFINITY;
@@ -131,7 +134,8 @@ mod tests {
         assert!((cold - warm).norm() < 1e-12, "{cold} {warm}");
     }
 
-    /// A shallow hill is touched exactly under the middle, where the program is dual degenerate: without the perturbation it cycles.
+    /// A shallow hill is touched exactly under the middle, where the program is dual degenerate: without the
+    /// perturbation it cycles.
     #[test]
     fn a_shallow_hill_has_a_minimum() {
         let mut random = fastrand::Rng::with_seed(64);

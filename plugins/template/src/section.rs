@@ -19,11 +19,11 @@ pub(crate) struct Chord {
     pub(crate) length: f64,
 }
 
-/// Profile under a template, with its places on the plate.
+/// Profile under a template, with its points on the plate.
 #[derive(Debug, Clone)]
 pub(crate) struct Section {
     pub(crate) profile: Profile,
-    /// Places along the line, at equal steps.
+    /// Positions along the line, at equal steps.
     pub(crate) along: Vec<f64>,
     /// Sagitta of the template's edge: height of its chord over its middle, positive when its centre lies above.
     pub(crate) target_sagitta: f64,
@@ -32,7 +32,7 @@ pub(crate) struct Section {
     frame: Frame,
 }
 
-/// Section plane: direction of the chord between two places of a curve, and the direction up.
+/// Section plane: direction of the chord between two points of a curve, and the direction up.
 #[derive(Debug, Clone, Copy)]
 struct Frame {
     origin: Vec3,
@@ -46,7 +46,7 @@ impl Line {
         Self { name: name.into(), from, to, length }
     }
 
-    /// Returns the place on the plate at distance `s` from the first point.
+    /// Returns the point on the plate at distance `s` from the first point.
     pub(crate) fn at(&self, s: f64) -> [f64; 2] {
         let f = s / self.length;
         [0, 1].map(|k| self.from[k] + f * (self.to[k] - self.from[k]))
@@ -59,12 +59,12 @@ impl Line {
 }
 
 impl Section {
-    /// Projects the faces of plate and target into their section planes: x along the chord between the material places
-    /// under the template's ends, 0 at its middle; heights along the normal there. Sideways curvature out of the plane (the
-    /// helix of an oblique line) is dropped, as a straight template drops it.
+    /// Projects the faces of plate and target into their section planes: x along the chord between the material points
+    /// under the template's ends, 0 at its middle; heights along the normal there. Sideways curvature out of the plane
+    /// (the helix of an oblique line) is ignored, as with a real straight template.
     ///
-    /// A template as long as its line would extend beyond the ends of a bent plate, whose chord is shorter than its line; the
-    /// section ends with the plate.
+    /// A template as long as its line would extend beyond the ends of a bent plate, whose chord is shorter than its
+    /// line; the section ends with the plate.
     pub(crate) fn new(
         now: &Surface,
         target: &TargetSurface,
@@ -107,17 +107,17 @@ impl Section {
         }
     }
 
-    /// Returns the cosine between the plate's normal and the direction of the gap. A place that moves by 1 along its normal
-    /// changes the profile by the inverse.
+    /// Returns the cosine between the plate's normal and the direction of the gap. A point that moves by 1 along its
+    /// normal changes the profile by the inverse.
     pub(crate) fn cosine(&self, normal: &Vec3) -> f64 {
         normal.dot(&self.frame.up)
     }
 
-    /// Returns the radius of the circle through both ends and the middle of the plate's profile (R = c^2 / 8 s + s / 2),
-    /// positive when its centre lies above; `None` for a straight profile.
+    /// Returns the radius of the circle through both ends and the middle of the plate's profile (R = c^2 / 8 s + s /
+    /// 2), positive when its centre lies above; `None` for a straight profile.
     pub(crate) fn radius(&self) -> Option<f64> {
         let (first, last) = (self.profile.x[0], self.profile.x[self.profile.x.len() - 1]);
-        // 1 um under a template of 2 m: a radius of 500 km.
+        // 1 um under a template of 2 m corresponds to a radius of 500 km.
         const STRAIGHT: f64 = 1e-6;
         (self.sagitta.abs() > STRAIGHT)
             .then(|| (last - first).powi(2) / (8.0 * self.sagitta) + 0.5 * self.sagitta)
@@ -137,8 +137,8 @@ impl Frame {
         (q.dot(&self.along), q.dot(&self.up))
     }
 
-    /// Returns the distance along the line at which the curve reaches x, by fixed-point iteration: dx/ds is near 1, so each
-    /// round leaves at most a tenth of the error.
+    /// Returns the distance along the line at which the curve reaches x, by fixed-point iteration: dx/ds is near 1, so
+    /// each round leaves at most a tenth of the error.
     fn reach(&self, curve: &impl Fn(f64) -> Vec3, centre: f64, x: f64) -> f64 {
         (0..12).fold(centre + x, |s, _| s + x - self.project(&curve(s)).0)
     }

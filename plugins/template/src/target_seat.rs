@@ -1,10 +1,10 @@
 //! Seat of the target on the plate: rigid fit, then one-sided contact by a linear program.
 //!
 //! The target's face is laid on the plate's face from the scanner's side, as a rigid surface. Its direction follows the
-//! plate's (u, v), by the least-squares rigid fit of all material points that were seen. Its height and two small tilts then solve
-//! the linear program "lowest over the middle of the plate, nowhere through the plate". On a plate that is not bent enough the tilt is
-//! undetermined, as it is under a template: a target that rocks keeps the tilt of the fit. Other seats are near-optimal vertices of the
-//! linear program, found with its objective moved beside the middle.
+//! plate's (u, v), by the least-squares rigid fit of all material points that were seen. Its height and two small tilts
+//! then solve the linear program "lowest over the middle of the plate, nowhere through the plate". On a plate that is
+//! not bent enough the tilt is undetermined, as it is under a template: a target that rocks keeps the tilt of the fit.
+//! Other seats are near-optimal vertices of the linear program, found by shifting its objective away from the middle.
 
 use platen_sdk::{Error, ErrorKind, Result};
 use platen_shape::{Placement, Surface, TargetSurface, Vec3};
@@ -39,7 +39,7 @@ impl Support {
         seat(Vec3::x(), &self.rows, &heights, &self.places, size, None)
     }
 
-    /// Returns the seat in each trial; that of `measured` where there is none.
+    /// Returns the seat in each trial; the seat of `measured` if a trial has none.
     pub(crate) fn seats_in(
         &self,
         trials: &Trials<'_>,
@@ -61,7 +61,8 @@ impl Support {
         }))
     }
 
-    /// Returns the movements to seats in which the middle of the target lies no more than `by` higher than in the measured one.
+    /// Returns the movements to seats in which the middle of the target lies higher than in the measured one by no more
+    /// than `by`.
     pub(crate) fn seats_within(
         &self,
         by: f64,
@@ -77,7 +78,8 @@ impl Support {
                 let objective = Vec3::new(1.0, off_middle * x, off_middle * y);
                 let start = Some(measured.vertex);
                 let seat = seat(objective, &self.rows, &heights, &self.places, size, start);
-                // The feasible movements are convex: a seat that is too high is approached until the middle has risen by as much.
+                // The feasible movements are convex: a seat that is too high is approached until the middle has risen
+                // by `by`.
                 found.extend(seat.map(|seat| {
                     let rise = seat.lowest - measured.lowest;
                     measured.movement
@@ -89,7 +91,7 @@ impl Support {
     }
 }
 
-/// The target at rest.
+/// Target at rest on the plate.
 #[derive(Debug, Clone)]
 pub(crate) struct Seat {
     /// Movement from the fit.
@@ -101,7 +103,7 @@ pub(crate) struct Seat {
     pub(crate) lowest: f64,
 }
 
-/// Returns the seat over these heights; `start` are active constraints of a plate that is alike.
+/// Returns the seat over these heights; `start` are the active constraints of a similar plate.
 fn seat(
     objective: Vec3,
     rows: &[Vec3],
@@ -141,14 +143,14 @@ fn seat(
     })
 }
 
-/// The target touches where its gap is no larger, metres: a target that lies flush on a part of the plate touches all of it, of which the linear
-/// program names any three places.
+/// Largest gap at which the target counts as touching, metres. A target that lies flush on a part of the plate touches
+/// all of it, but the linear program returns any three of these points.
 const TOUCHES: f64 = 10e-6;
-/// Directions in which the extent of the contacts is taken: the smallest is right to 0.5 %.
+/// Number of directions in which the extent of the contacts is measured: the smallest extent is accurate to 0.5 %.
 const DIRECTIONS: usize = 32;
 /// Part of the shorter side that the contacts must span in every direction; with less the target rocks.
 const ROCKS: f64 = 0.25;
-/// How far from the middle other seats are sought as the lowest, shares of the shorter side.
+/// Distances from the middle at which other seats are searched, as shares of the shorter side.
 const OFF_MIDDLE: [f64; 3] = [0.001, 0.01, 0.1];
 
 /// Returns the derivative of the deviation at a place by the target's rise and tilts, with its sign reversed.
@@ -158,7 +160,7 @@ pub(crate) fn row(target: &TargetSurface, [u, v]: [f64; 2]) -> Vec3 {
     Vec3::new(n.z, turn.x, turn.y)
 }
 
-/// Returns the smallest extent of places over all directions.
+/// Returns the smallest extent of the points over all directions.
 fn narrowest(places: &[[f64; 2]]) -> f64 {
     let extent = |k: usize| {
         let (sin, cos) = (std::f64::consts::PI * k as f64 / DIRECTIONS as f64).sin_cos();

@@ -1,4 +1,4 @@
-//! Whole comparisons on plates of closed form.
+//! Tests of whole comparisons on closed-form plates.
 
 mod calibrated;
 mod contact;
@@ -19,12 +19,12 @@ const WIDTH: f64 = 3.0;
 const HEIGHT: f64 = 2.0;
 const THICKNESS: f64 = 0.04;
 
-/// Returns a generator. Consecutive seeds of this generator are correlated, so seeds are spread out.
+/// Returns a generator. Generators with consecutive seeds are correlated, so the seeds are spread out.
 fn spread(seed: u64) -> fastrand::Rng {
     fastrand::Rng::with_seed(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15))
 }
 
-/// A fit to points of the mid-surface with noise along the normal, everything seen.
+/// Returns a fit to points of the mid-surface with noise along the normal, with everything seen.
 fn surface(n_points: usize, sigma: f64, seed: u64, plate: impl Fn(f64, f64) -> (Vec3, Vec3)) -> Surface {
     let mut random = spread(seed);
     let mut normal = || {
@@ -47,7 +47,7 @@ fn surface(n_points: usize, sigma: f64, seed: u64, plate: impl Fn(f64, f64) -> (
     Surface::new(fit.solve([0.0, 0.0, 1.0]).expect("determined"), THICKNESS, mask)
 }
 
-/// The plate as a shape, near enough without noise, turned and moved as a plate lies before a scanner.
+/// Returns a plate of a shape, almost without noise, in the pose of a plate before a scanner.
 fn plate_of(shape: TargetShape, facing: Facing) -> Surface {
     let target = goal(shape, facing);
     let turn = nalgebra::Rotation3::from_euler_angles(0.4, -0.7, 1.9);
@@ -55,7 +55,7 @@ fn plate_of(shape: TargetShape, facing: Facing) -> Surface {
     surface(20_000, 1e-6, 1, |u, v| (turn * target.point(u, v) + away, turn * target.normal(u, v)))
 }
 
-/// The plate with a strip across u that was not seen.
+/// Returns the plate with a strip across u that was not seen.
 fn hidden(now: &Surface, from: f64, to: f64) -> Surface {
     let mut parts = now.to_parts();
     let [n_u, n_v] = parts.mask_cells;
@@ -66,7 +66,8 @@ fn hidden(now: &Surface, from: f64, to: f64) -> Surface {
     Surface::from_parts(parts).expect("sound")
 }
 
-/// Radii are those of the mid-surface, so that a plate and its target differ by the radius alone.
+/// Returns a target whose radii are those of the mid-surface, so that a plate and its target differ by the radius
+/// alone.
 fn goal(shape: TargetShape, scanned_face: Facing) -> TargetSurface {
     let target = Target { shape, radius_of: RadiusOf::Mid, scanned_face };
     TargetSurface::new(&target, WIDTH, HEIGHT, THICKNESS).expect("sound")
@@ -110,13 +111,13 @@ fn figure(report: &Report, name: &str) -> f64 {
     report.findings.figures.iter().find(|f| f.name == name).unwrap_or_else(|| panic!("no {name}")).value
 }
 
-/// A figure and its uncertainty.
+/// Returns a figure and its uncertainty.
 fn stated(report: &Report, name: &str) -> (f64, f64) {
     let figure = report.findings.figures.iter().find(|figure| figure.name == name).expect("a figure");
     (figure.value, figure.uncertainty.expect("stated"))
 }
 
-/// Straight lines along v.
+/// Returns a cylinder with straight lines along v.
 fn cylinder(radius: f64) -> TargetShape {
     TargetShape::Cylinder { radius, axis: std::f64::consts::FRAC_PI_2 }
 }

@@ -1,4 +1,4 @@
-//! Energy and gradient of the boundary springs against their sum over the plate.
+//! Test of energy and gradient of the boundary springs against their sum over the plate.
 
 use crate::boundary_springs::BoundarySprings;
 use platen_shape::flatten::closed_form::ClosedForm;
@@ -11,7 +11,7 @@ fn a_shifted_plate_stretches_the_springs_across_its_shift() {
     plate.parts.corner_sigma = [4, 6, 8, 10].map(|k| [sigma(k), sigma(k + 1)]);
     let (strain, shift) = (1e-3, 1e-4);
     let springs = BoundarySprings::new(&plate.mesh().unwrap(), strain);
-    // Edges u = W and u = 0, then at each corner the edge along u: it leaves the corners 0 and 2.
+    // Edges u = W and u = 0, then at each corner the edge along u, which leaves the corners 0 and 2.
     for (axis, held_by) in [(0, [1, 3, 4, 7, 8, 11]), (1, [0, 2, 5, 6, 9, 10])] {
         let mut x = plate.uv.clone();
         x.iter_mut().for_each(|p| p[axis] += shift);

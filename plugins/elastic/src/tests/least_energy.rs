@@ -1,5 +1,7 @@
-//! Least membrane energy of a sphere found without a mesh: a polynomial map from the rectangle into the sphere with free
-//! edges, its energy integrated by Gauss's rule, its coefficients by Gauss and Newton.
+//! Reference solution for the least membrane energy of a sphere, found without a mesh.
+//!
+//! It is a polynomial map from the rectangle into the sphere with free edges. Its energy is integrated by Gauss's rule,
+//! its coefficients are found by the method of Gauss and Newton.
 
 use nalgebra::{DMatrix, DVector};
 use platen_shape::flatten::closed_form::sphere_of_fibres;
@@ -14,7 +16,7 @@ const GAUSS: [(f64, f64); 4] = [
     (0.960_289_856_497_536_3, 0.101_228_536_290_376_26),
 ];
 
-/// The map of least energy from material coordinates to space.
+/// Returns the map of least energy from material coordinates to space.
 pub(super) fn sphere_of_least_energy(
     radius: f64,
     size: [f64; 2],
@@ -43,7 +45,7 @@ pub(super) fn sphere_of_least_energy(
     }
 }
 
-/// The sphere of fibres with its material shifted by polynomials: odd along the shift, even across.
+/// Sphere of fibres with its material shifted by polynomials: odd along the shift, even across.
 struct PolynomialMap {
     radius: f64,
     half: [f64; 2],
@@ -60,7 +62,7 @@ impl PolynomialMap {
         [p[0] / self.half[0] - 1.0, p[1] / self.half[1] - 1.0]
     }
 
-    /// Shift at a normalised place, and its derivatives by u and v.
+    /// Returns the shift at a normalised position, and its derivatives by u and v.
     fn shift(&self, c: &DVector<f64>, [a, b]: [f64; 2]) -> ([f64; 2], [[f64; 2]; 2]) {
         let (mut shift, mut slope) = ([0.0; 2], [[0.0; 2]; 2]);
         let power = |x: f64, n: i32| if n < 0 { 0.0 } else { x.powi(n) };
@@ -79,7 +81,8 @@ impl PolynomialMap {
         (shift, slope)
     }
 
-    /// Strain at Gauss's points, scaled so that half the sum of squares is the energy of a quarter of the plate.
+    /// Returns the strain at Gauss's points, scaled so that half the sum of squares is the energy of a quarter of the
+    /// plate.
     fn residuals(&self, c: &DVector<f64>, poisson: f64) -> DVector<f64> {
         let young = 1.0 / (1.0 - poisson * poisson);
         let mut residuals = Vec::new();
@@ -103,7 +106,7 @@ impl PolynomialMap {
     }
 }
 
-/// Gauss's rule on [0, 1]: the plate is symmetric.
+/// Returns Gauss's rule on [0, 1], since the plate is symmetric.
 fn halves(&(x, w): &(f64, f64)) -> [(f64, f64); 2] {
     [(0.5 - 0.5 * x, 0.5 * w), (0.5 + 0.5 * x, 0.5 * w)]
 }

@@ -1,11 +1,11 @@
-//! Energy, gradient and Hessian against differences and closed forms.
+//! Tests of energy, gradient and Hessian against differences and closed forms.
 
 use crate::membrane::{Forms, Membrane, Strained, positive_part};
 use platen_numerics::random::Random;
 use platen_shape::DiskMesh;
 use platen_shape::flatten::closed_form::ClosedForm;
 
-/// A small plate, its material places shaken by `strain`.
+/// Returns a small plate with its material positions disturbed by `strain`.
 fn shaken(strain: f64, seed: u64) -> (DiskMesh, Vec<[f64; 2]>) {
     let surface = |[u, v]: [f64; 2]| [u + 0.1 * v, v, 0.2 * u * v + 0.1 * u * u];
     let plate = ClosedForm::new(surface, [1.0, 0.8], [4, 3], 0.2, seed);

@@ -1,17 +1,17 @@
-//! Gaps of scans with a systematic error, once the scanner is calibrated on an artefact.
+//! Test of gaps from scans with a systematic error, after the scanner was calibrated on an artefact.
 
 use platen_shape::inspection::calibration::{artefact_gaps, covering};
 
 use super::*;
 
-/// Amplitude of the systematic error, metres: what a phase scanner's range shows in the field.
+/// Amplitude of the systematic error, metres: as observed in the ranges of a phase scanner in the field.
 const WAVE: f64 = 0.25e-3;
 
-/// A scan of a plate: 0.5 mm noise, and the scanner's range error, which depends on where the plate lies.
+/// Returns a scan of a plate: 0.5 mm noise, and the scanner's range error, which depends on the position of the plate.
 fn scan(radius: f64, seed: u64) -> Surface {
     let mut random = spread(seed ^ 0x5eed);
     let [phase, turn] = [random.f64(), random.f64()].map(|share| std::f64::consts::TAU * share);
-    // The range changes by a metre over 1.2 m of a plate seen at 45 degrees; its error swings over 0.8 m to 1.2 m.
+    // The range changes by a metre over 1.2 m of a plate seen at 45 degrees; the period of its error is 0.8 m to 1.2 m.
     let wave_number = std::f64::consts::TAU / (0.8 + 0.4 * random.f64());
     let (sin, cos) = turn.sin_cos();
     let plate = goal(cylinder(radius), Facing::Inside);
@@ -26,13 +26,13 @@ fn gaps_lie_within_their_uncertainty_after_calibration() {
     let shape = goal(cylinder(8.0), Facing::Inside);
     let gaps: Vec<_> = (0..12).flat_map(|seed| artefact_gaps(&scan(8.0, seed), &shape, 2.0, 0.0)).collect();
     let sigma_true = covering(&gaps);
-    // At most twice the wave shows under a template, about two standard deviations.
+    // Under a template the error is at most twice the wave, about two standard deviations.
     assert!((0.6 * WAVE..1.1 * WAVE).contains(&sigma_true), "{sigma_true}");
 
     let mut task = task(cylinder(8.0), Facing::Inside, Seat::Balanced);
     let (plates, mut before, mut after) = (200, 0, 0);
     for seed in 0..plates {
-        // Every second plate is not bent enough; radii far enough from the target's that the gap has its sign.
+        // Every second plate is not bent enough; the radii differ enough from the target's that the gap has its sign.
         let radius = if seed % 2 == 0 { 9.0 + 0.01 * seed as f64 } else { 7.3 - 0.01 * seed as f64 };
         task.sigma_true = None;
         let truth =

@@ -1,8 +1,9 @@
-//! Templates on circles, on either face, and a rigid template lowered and rolled by exhaustive search.
+//! Tests of the contact: templates on circles, on either face, and a rigid template lowered and rolled by exhaustive
+//! search.
 
 use super::*;
 
-/// Height of a circle over its chord's ends.
+/// Returns the height of a circle over its chord's ends.
 pub(super) fn rise(radius: f64, chord: f64) -> f64 {
     radius - (radius * radius - 0.25 * chord * chord).sqrt()
 }
@@ -21,7 +22,7 @@ fn circles_give_the_difference_of_their_sagittas_on_either_face() {
             assert_eq!((found.sense, found.verdict), (sense, Verdict::Fail));
             assert!(found.says.starts_with(word), "{}", found.says);
 
-            // A template touches with its ends where the plate is more hollow than its edge.
+            // A template touches with its ends if the plate is more hollow than its edge.
             let ends_touch = (word == "bent too far") == (facing == Facing::Inside);
             assert_eq!((found.rocks, found.contacts.len()), (!ends_touch, if ends_touch { 2 } else { 1 }));
             assert_eq!(found.seat, if ends_touch { Seat::Gravity } else { Seat::Balanced });
@@ -117,15 +118,17 @@ fn the_worst_place_is_where_the_bend_is_missing() {
     task.templates[0].centre = Centre::Worst;
     let found = finding(&now, &task);
     assert!(found.says.starts_with("under-bent"), "{}", found.says);
-    // Balanced over the middle of the flat: half of the missing slope, 0.5 m away, 0.0375 * (0.5 - 0.15) = 13.1 mm. A little more where it
-    // lies on the bend before the flat, just before it rocks there: 0.46^2 / 16 = 13.2 mm at its end over the flat.
+    // Balanced over the middle of the flat: half of the missing slope, 0.5 m away, 0.0375 * (0.5 - 0.15) = 13.1 mm. The
+    // gap is slightly larger where the template lies on the bend before the flat, just before it rocks there: 0.46^2 /
+    // 16 = 13.2 mm at its end over the flat.
     assert!((0.0131..0.0137).contains(&found.max_gap), "{found:?}");
     assert!(!found.rocks && (found.max_gap_at[0] - 1.96).abs() < 0.0125, "{found:?}");
 }
 
-/// The lowest place of a rigid template on a plate, both closed curves in the section plane, by exhaustive search: for every tilt of the
-/// template it is lowered until it touches; the tilt that brings its middle lowest counts. Returns the largest gap
-/// along the template's own normal direction, and the first and the last place along the plate where it touches.
+/// Returns the lowest position of a rigid template on a plate, both closed curves in the section plane, by exhaustive
+/// search. For every tilt the template is lowered until it touches; the tilt that brings its middle lowest counts.
+/// Returned are the largest gap along the template's own normal direction, and the first and the last point along the
+/// plate where it touches.
 fn lowered(
     template: impl Fn(f64) -> f64,
     plate: impl Fn(f64) -> f64,
@@ -163,8 +166,8 @@ fn a_rigid_template_lowered_by_trying_shows_the_same_gap() {
     {
         let height = |x: f64| x * x / (2.0 * radius) + size * (f * x + phase).cos();
         let slope = |x: f64| x / radius - size * f * (f * x + phase).sin();
-        // The face over arc length from its middle: material places are counted along the mid-surface, which lies
-        // half a thickness below and is as long as makes its own arc u.
+        // The face over arc length from its middle: material points are counted along the mid-surface, which lies half
+        // a thickness below and has the length of its own arc u.
         let steps = 8_000;
         let dx = 3.4 / f64::from(steps);
         let mut mid = vec![];
@@ -202,7 +205,8 @@ fn a_rigid_template_lowered_by_trying_shows_the_same_gap() {
     }
 }
 
-/// A plate after some of the strokes that roll it: bends of 0.028 rad, each 0.1 m long, and flat behind the last one.
+/// Returns a plate after some of the strokes that roll it: bends of 0.028 rad, each 0.1 m long, and flat behind the
+/// last one.
 fn half_rolled(bends: &[f64]) -> Surface {
     surface(20_000, 1e-6, 1, |u, v| {
         // Slope in sections of 5 mm, from the flat end.
@@ -221,7 +225,8 @@ fn half_rolled(bends: &[f64]) -> Surface {
     })
 }
 
-/// With few places the search misses the worst position by 2.7 mm after six bends, and by 23 mm on a noisy plate after four.
+/// With few points the search misses the worst position by 2.7 mm after six bends, and by 23 mm on a noisy plate after
+/// four.
 #[test]
 fn the_worst_position_is_the_worst_of_all() {
     let all = [0.27, 0.41, 0.66, 0.88, 1.11, 1.37, 1.69, 1.93];

@@ -1,4 +1,4 @@
-//! Tasks and scans that cannot be judged, and refusals.
+//! Tests of tasks and scans that cannot be judged, and of refusals.
 
 use super::*;
 

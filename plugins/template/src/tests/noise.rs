@@ -1,8 +1,8 @@
-//! Gaps of noisy scans against the truth.
+//! Tests of gaps from noisy scans against the truth.
 
 use super::*;
 
-/// Error and stated uncertainty of the gap for several scans of an under-bent plate.
+/// Returns error and stated uncertainty of the gap for several scans of an under-bent plate.
 fn errors(sigma: f64, seeds: std::ops::Range<u64>) -> Vec<(f64, f64)> {
     let plate = goal(cylinder(9.0), Facing::Inside);
     let task = task(cylinder(8.0), Facing::Inside, Seat::Balanced);
@@ -40,8 +40,8 @@ fn gaps_lie_within_their_stated_uncertainty() {
     assert!(errors[0].1 < 4.0 * rms, "stated {} for an rms error of {rms}", errors[0].1);
 }
 
-/// Bent to the target's radius up to the middle, straight beyond: along the bend the template lies close everywhere, so that noise
-/// decides where it touches.
+/// Returns a plate that is bent to the target's radius up to the middle and straight beyond. Along the bend the
+/// template lies close everywhere, so that noise determines where it touches.
 fn half_bent(u: f64, v: f64) -> (Vec3, Vec3) {
     let radius = 8.0;
     let (sin, cos) = (u.min(1.5) / radius).sin_cos();
@@ -67,8 +67,8 @@ fn a_gap_whose_seat_noise_decides_states_the_other_seat() {
     }
 }
 
-/// Two humps on a plate of the target's shape, one of them under the middle of the template: it lies on that one and on the other or on its end, and the
-/// noise of the scan decides on which.
+/// Two humps on a plate of the target's shape, one of them under the middle of the template. The template lies on that
+/// hump and on the other one or on its end; the noise of the scan determines which.
 #[test]
 fn noise_that_moves_a_template_to_another_contact_is_in_its_uncertainty() {
     let bent = goal(cylinder(8.0), Facing::Inside);
@@ -87,6 +87,7 @@ fn noise_that_moves_a_template_to_another_contact_is_in_its_uncertainty() {
         within += usize::from(off <= found.uncertainty);
         far += usize::from(off > 0.2e-3);
     }
-    // Found: 17 within, 13 by the weights of the contacts alone. 19 expected; fewer than 16 of 20 has a chance of 1 in 300.
+    // Found: 17 within, 13 by the weights of the contacts alone. 19 expected; fewer than 16 of 20 has a chance of 1 in
+    // 300.
     assert!(within >= 16 && far > 2, "{within} of 20 within, {far} in the other seat");
 }

@@ -1,4 +1,4 @@
-//! The whole target laid on the plate, stations, and what does not depend on where the plate lies.
+//! Tests of the whole target laid on the plate, of stations, and of invariance to the pose of the plate.
 
 use platen_model::{Quantity, Station};
 
@@ -24,8 +24,8 @@ fn a_sphere_on_a_flatter_one_touches_in_the_middle() {
     let report =
         run(&plate_of(plate, Facing::Inside), &task(target, Facing::Inside, Seat::Gravity)).expect("sound");
     assert_eq!(figure(&report, "deviation.rocks"), 1.0);
-    // The corner lies sqrt(3.25) / 2 m from the middle. Along the target's normal the spheres, which touch in the middle,
-    // are that far apart: distance to the target's centre, at the place of the plate's corner.
+    // The corner lies sqrt(3.25) / 2 m from the middle, where the spheres touch. The opening at the corner along the
+    // target's normal follows from the distance of the plate's corner from the target's centre.
     let [r, t] = [9.0 - THICKNESS / 2.0, 8.0 - THICKNESS / 2.0];
     let half_diagonal = 0.5 * (WIDTH * WIDTH + HEIGHT * HEIGHT).sqrt();
     let angle = half_diagonal / 9.0;
@@ -34,7 +34,7 @@ fn a_sphere_on_a_flatter_one_touches_in_the_middle() {
     let gap = figure(&report, "deviation.gap");
     // Found: 2.4 um.
     assert!((gap + away).abs() < 5e-6, "{gap} {away}");
-    // In the best fit both signs are there, and together they are about what is open in the seat.
+    // The best fit has deviations of both signs; the difference of their extremes is about the opening in the seat.
     let [max, min] = ["deviation.max", "deviation.min"].map(|name| figure(&report, name));
     assert!(max > 0.2 * gap && min < -0.2 * gap, "{max} {min}");
     // Found: 0.19 mm; the two poses have different normals.
@@ -111,7 +111,7 @@ fn the_search_finds_a_gap_that_no_template_covers() {
     );
 }
 
-/// Two of the corners on which the target lies are out of sight: on what was seen it lies lower there.
+/// Two of the corners on which the target lies were not seen: on the part that was seen the target lies lower there.
 #[test]
 fn a_seat_that_was_not_seen_is_in_the_uncertainty() {
     let [plate, target] = [7.0, 8.0].map(|radius| TargetShape::Sphere { radius });
@@ -133,8 +133,8 @@ fn a_seat_that_was_not_seen_is_in_the_uncertainty() {
     }
 }
 
-/// A plate that is bent to its target on one half, flat on the other: the target lies flush on the one half, and the noise of the scan says nothing
-/// of its seat. What it may do to the other half is in the uncertainty.
+/// A plate is bent to its target on one half and flat on the other. The target lies flush on the one half, and the
+/// noise of the scan does not determine its seat. The possible effect on the other half is in the uncertainty.
 #[test]
 fn a_half_bent_plate_has_one_seat() {
     let bent = goal(cylinder(12.0), Facing::Outside);
@@ -154,13 +154,14 @@ fn a_half_bent_plate_has_one_seat() {
             let [(known, _), (value, uncertainty)] = [&known, &found].map(|report| stated(report, name));
             let off = (value - known).abs();
             println!("{seed} {name}: {off:.3e} m off, {uncertainty:.3e} stated");
-            // Found: 0.12 mm at most; 17 mm where three contacts of any solution of the linear program decide alone whether it rocks.
+            // Found: 0.12 mm at most; 17 mm where three contacts of any solution of the linear program decide alone
+            // whether it rocks.
             assert!(off <= uncertainty && off < 0.25e-3, "{seed} {name}: {value} {uncertainty} {known}");
         }
     }
 }
 
-/// Two templates cross at a station: its gap is that of the first, whichever has a place a hair nearer.
+/// Two templates cross at a station: its gap is that of the first, whichever template has a slightly nearer point.
 #[test]
 fn a_station_on_two_templates_belongs_to_the_first() {
     let mut task = task(cylinder(8.0), Facing::Inside, Seat::Gravity);
