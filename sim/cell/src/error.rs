@@ -1,4 +1,4 @@
-//! Errors of the program.
+//! Errors of the program, by the person who must act.
 
 use std::path::PathBuf;
 

@@ -1,16 +1,17 @@
-//! Program `platen-sim`: a simulated press, a simulated scanner, or both on one plate, for tests of hosts over real sockets and
-//! files.
+//! Program `platen-sim`: a simulated press, a simulated scanner, or both on one plate, for tests of hosts over real
+//! sockets and files.
 //!
 //! - `platen-sim press` serves Modbus and the plate's shape on loopback.
-//! - `platen-sim scanner PLATE.toml --out scan.e57` scans a described plate into a file, with the ground truth beside it.
+//! - `platen-sim scanner PLATE.toml --out scan.e57` scans a described plate into a file, with the ground truth beside
+//!   it.
 //! - `platen-sim scanner PLATE.toml --serve 127.0.0.1:7040` serves scans of it by the scan bridge protocol.
 //! - `platen-sim cell --serve 127.0.0.1:7040` runs a press with such a scanner beside it.
 //! - `platen-sim cell --drop FOLDER` runs a press whose scanner writes a file into a folder at each accepted stroke.
 //!
 //! A server prints one line when its ports are open: `{"modbus":"127.0.0.1:5020","plate":"127.0.0.1:5021"}`, with
-//! `"scanner"` where scans are served, and at the end the counters of the bridge. It ends on SIGTERM, Ctrl-C, the command `stop` of the
-//! control port and, with `--with-parent`, when its standard input closes. Results go to stdout, the log to stderr (`PLATEN_LOG`). Exit
-//! codes: 0 success, 1 failure, 2 invalid usage or file.
+//! `"scanner"` where scans are served. At the end it prints the counters of the bridge. It ends on SIGTERM, Ctrl-C, the
+//! command `stop` of the control port and, with `--with-parent`, when its standard input closes. Results go to stdout,
+//! the log to stderr (`PLATEN_LOG`). Exit codes: 0 success, 1 failure, 2 invalid usage or file.
 
 mod bridge;
 mod cell;

@@ -1,7 +1,7 @@
 //! Double-V bevelled edges: how far each height of a side face lies inside of the mid-surface's edge.
 //!
-//! A bevelled edge has three strips: a flank below the upper face, a square root face in the middle, and a flank above the
-//! underside. A square edge has one strip.
+//! A bevelled edge has three strips: a flank below the upper face, a square root face in the middle, and a flank above
+//! the underside. A square edge has one strip.
 
 use crate::Blank;
 
@@ -26,7 +26,8 @@ impl Strip {
     }
 }
 
-/// Returns the strips of a blank's side faces: the upright one first, if there is one, then the upper and the lower flank.
+/// Returns the strips of a blank's side faces: the upright one first, if there is one, then the upper and the lower
+/// flank.
 pub(crate) fn strips(blank: &Blank) -> Vec<Strip> {
     let half = 0.5 * (blank.thickness_mm * 1e-3);
     let (inset, root) = (blank.face_inset_mm * 1e-3, 0.5 * (blank.root_face_mm * 1e-3));

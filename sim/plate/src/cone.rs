@@ -14,15 +14,15 @@ pub(crate) struct Cone {
 }
 
 impl Cone {
-    /// Creates a cone. `radius` (m): radius of normal curvature in the middle; `growth`: its positive growth per metre of slant;
-    /// `side`: 1 when the centre lies above the plate, else -1.
+    /// Creates a cone. `radius` (m): radius of normal curvature in the middle; `growth`: its positive growth per metre
+    /// of slant; `side`: 1 when the centre lies above the plate, else -1.
     pub(crate) fn new(radius: f64, growth: f64, side: f64) -> Self {
         let (sin_alpha, cos_alpha) = growth.atan().sin_cos();
         Self { slant: radius / growth, sin_alpha, cos_alpha, side }
     }
 
-    /// Returns the point and its derivatives by (s, r). The polar angle of the development is the angle about the axis times
-    /// sin(alpha).
+    /// Returns the point and its derivatives by (s, r). The polar angle of the development is the angle about the axis
+    /// times sin(alpha).
     pub(crate) fn jet(&self, s: f64, r: f64) -> Jet {
         let along = self.slant + r;
         let rho = s.hypot(along);

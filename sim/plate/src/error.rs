@@ -1,6 +1,6 @@
 //! Errors of plate descriptions and strokes.
 
-/// Error of building a state or applying a stroke, by who must act.
+/// Error of building a state or applying a stroke, by the person who must act.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum PlateError {
     /// Invalid value in a description: change the document.

@@ -1,12 +1,16 @@
 //! Fibre model of steel under a press: three-point bending of a strip by a ram that is driven to a depth.
 //!
-//! The strip is a row of sections across the bend lines, each a stack of fibres through the thickness, each fibre four layers in parallel
-//! that yield one after the other (Besseling's overlay model) beside a weak elastic one: a round knee, kinematic hardening and a lower
-//! yield point backwards (Bauschinger). The moment falls linearly from the punch to the shoulders; the curvature of each section follows
-//! from it, the deflection from the curvatures, the force from the wanted depth; then the plate unloads to no moment. Nothing here is in
-//! closed form, and nothing is shared with the product.
+//! The strip is a row of sections across the bend lines. Each section is a stack of fibres through the thickness. Each
+//! fibre consists of four layers in parallel that yield one after the other (Besseling's overlay model), and of a weak
+//! elastic one. The stack has a rounded yield curve, kinematic hardening and a lower yield point backwards
+//! (Bauschinger).
 //!
-//! Not modelled: residual stress, shear, indentation, change of the contact with the angle, tilt of the ram, anything along the line.
+//! The moment decreases linearly from the punch to the shoulders. The curvature of each section follows from the
+//! moment, the deflection from the curvatures, and the force from the wanted depth; then the plate unloads to zero
+//! moment. The model has no closed form and shares nothing with the product.
+//!
+//! Limits: residual stress, shear, indentation, change of the contact with the angle, tilt of the ram and any variation
+//! along the line are not modelled.
 
 use std::f64::consts::PI;
 
@@ -37,7 +41,7 @@ pub struct FibreSteel {
     pub thickness: f64,
 }
 
-/// Press and die as they are, not as they are marked.
+/// True properties of press and die, which may differ from the marked ones.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Press {
     /// Distance between the shoulders, metres.
@@ -50,7 +54,7 @@ pub struct Press {
     pub nominal_thickness: f64,
 }
 
-/// A strip across the bend lines.
+/// Strip across the bend lines.
 #[derive(Debug, Clone)]
 pub struct FibreStrip {
     step: f64,
@@ -62,7 +66,7 @@ struct Section {
     steel: FibreSteel,
     /// Curvature without load, 1/m.
     curvature: f64,
-    /// Curvature that was there before any load: the layers know nothing of it.
+    /// Curvature before any load, which the layers do not contain.
     initial: f64,
     /// Plastic strain of each layer of each fibre of the upper half; the lower half mirrors it.
     plastic: [[f64; 4]; 8],
@@ -97,7 +101,8 @@ impl Section {
 
     /// Returns the curvature at which the section carries a moment.
     fn curvature_of(&self, wanted: f64) -> f64 {
-        // The moment grows with the curvature and its stiffness never vanishes: Newton's step, halved back into a bracket.
+        // The moment increases with the curvature and its stiffness never vanishes: Newton's step, halved if it leaves
+        // the bracket.
         let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
         let mut curvature = self.curvature;
         for _ in 0..60 {
@@ -121,7 +126,7 @@ impl Section {
         self.yield_plane() * self.steel.thickness.powi(2) / 6.0
     }
 
-    /// Flows the layers to a curvature, and keeps it as the one without load.
+    /// Applies plastic flow of the layers up to a curvature, and keeps it as the curvature without load.
     fn flow(&mut self, curvature: f64) {
         let half = 0.5 * self.steel.thickness;
         let most = self.yield_plane();
@@ -137,7 +142,8 @@ impl Section {
 }
 
 impl FibreStrip {
-    /// Creates a strip of `length` metres in sections of about 5 mm, with the steel and the initial curvature at each place.
+    /// Creates a strip of `length` metres in sections of about 5 mm, with the steel and the initial curvature at each
+    /// place.
     #[must_use]
     pub fn new(length: f64, steel: impl Fn(f64) -> FibreSteel, curvature: impl Fn(f64) -> f64) -> Self {
         let n = (length / 5e-3).round().max(1.0) as usize;
@@ -161,8 +167,8 @@ impl FibreStrip {
         self.step
     }
 
-    /// Presses at `x` to a depth below the touch on a flat plate of nominal thickness, metres; `backwards` with the plate turned over.
-    /// Returns the angle that stays, radians, positive forwards.
+    /// Presses at `x` to a depth below the touch on a flat plate of nominal thickness, metres; `backwards` with the
+    /// plate turned over. Returns the angle that remains, radians, positive forwards.
     pub fn press(&mut self, press: &Press, x: f64, depth: f64, backwards: bool) -> f64 {
         let sign = if backwards { -1.0 } else { 1.0 };
         let half = 0.5 * press.opening;
@@ -212,7 +218,7 @@ impl FibreStrip {
         angle
     }
 
-    /// Returns the depth that leaves an angle at `x`, metres, by trial on copies of the strip.
+    /// Returns the depth after which an angle remains at `x`, metres, by trial on copies of the strip.
     #[must_use]
     pub fn depth_for(&self, press: &Press, x: f64, angle: f64) -> f64 {
         let (mut low, mut high) = (0.0, 0.05 + PI * angle * press.opening);
@@ -250,13 +256,13 @@ mod tests {
         assert!(plate.press(&PRESS, 1.5, 0.2e-3, false).abs() < 1e-12);
         let deep = plate.press(&PRESS, 1.5, 6e-3, false);
         let deeper = strip().press(&PRESS, 1.5, 7e-3, false);
-        // Beyond the plastic hinge a millimetre more leaves about 4 / w more; hardening takes some of it.
+        // Beyond the plastic hinge an additional millimetre leaves about 4 / w more; hardening reduces this.
         assert!(((deeper - deep) / (4e-3 / 0.36) - 1.0).abs() < 0.2, "{deep} {deeper}");
     }
 
     #[test]
     fn the_steel_remembers_its_first_direction() {
-        // After a bend a shallow stroke backwards leaves more than on a flat plate: it yields earlier.
+        // After a bend, a shallow stroke backwards leaves a larger angle than on a flat plate: it yields earlier.
         let mut plate = strip();
         plate.press(&PRESS, 1.5, 5e-3, false);
         let rest = |plate: &FibreStrip| -> f64 {

@@ -1,10 +1,10 @@
 //! Material map of a sheet on a surface that is not developable: minimum membrane energy by the Ritz method.
 //!
 //! With the Green strain e of the map from the rectangle to the surface, the energy is W = integral of
-//! (e_uu + e_vv)^2 - 2 (1 - nu) (e_uu e_vv - e_uv^2) over the rectangle (plane stress, St. Venant-Kirchhoff material, free
-//! edges). The map is the identity plus a series of Legendre polynomials in both parameters. W is a sum of squares, integrated
-//! by Fejer's first rule and minimised by Gauss-Newton iteration. The rigid motions that the energy of a sphere leaves
-//! free are fixed by a gauge: mean shift and mean rotation are zero.
+//! (e_uu + e_vv)^2 - 2 (1 - nu) (e_uu e_vv - e_uv^2) over the rectangle (plane stress, St. Venant-Kirchhoff material,
+//! free edges). The map is the identity plus a series of Legendre polynomials in both parameters. W is a sum of
+//! squares, integrated by Fejer's first rule and minimised by Gauss-Newton iteration. The rigid motions that the energy
+//! of a sphere leaves free are fixed by a gauge: mean shift and mean rotation are zero.
 //!
 //! Limit: the series has degree 7, converged to a micrometre on a sphere of 11 m radius (3 m x 2.5 m).
 
@@ -58,7 +58,8 @@ fn legendre(x: f64) -> ([f64; DEGREE + 1], [f64; DEGREE + 1]) {
     (p, d)
 }
 
-/// Returns nodes and weights of Fejer's first rule: the midpoint rule after the substitution x = cos(t) of Clenshaw and Curtis.
+/// Returns nodes and weights of Fejer's first rule: the midpoint rule after the substitution x = cos(t) of Clenshaw and
+/// Curtis.
 fn quadrature() -> Vec<(f64, f64)> {
     let t = |k: usize| std::f64::consts::PI * (k as f64 + 0.5) / N_QUADRATURE as f64;
     let weight = |k: usize| {
@@ -81,8 +82,8 @@ impl MaterialMap {
         self.coefficients.as_deref().map(|tables| shift(tables, x, y))
     }
 
-    /// Computes the map of minimum membrane energy onto `surface`. `axis` is the direction of r in (u, v), a unit vector;
-    /// `size` contains width and height, metres.
+    /// Computes the map of minimum membrane energy onto `surface`. `axis` is the direction of r in (u, v), a unit
+    /// vector; `size` contains width and height, metres.
     pub(crate) fn least_energy(surface: &SweptSurface, axis: [f64; 2], size: [f64; 2]) -> Self {
         let sheet = Sheet { surface, axis, half: size.map(|length| length / 2.0) };
         let mut tables = Box::new([[[0.0; DEGREE + 1]; DEGREE + 1]; 2]);
@@ -209,7 +210,8 @@ impl Sheet<'_> {
         }
     }
 
-    /// Fills in the rows of the gauge: two mean shifts and the mean rotation (coefficients of a small rotation of the sheet).
+    /// Fills in the rows of the gauge: two mean shifts and the mean rotation (coefficients of a small rotation of the
+    /// sheet).
     fn gauge_rows(&self, first: usize, rows: &mut DMatrix<f64>) {
         let ([ax, ay], [hu, hv]) = (self.axis, self.half);
         rows[(first, 0)] = GAUGE_WEIGHT;

@@ -1,6 +1,7 @@
 //! Geometry prepared from one state of a plate: surface, derivatives, curvature and material map.
 //!
-//! The mid-surface is a [`SweptSurface`] or a [`Cone`]; faces are its parallel surfaces at plus and minus half the thickness.
+//! The mid-surface is a [`SweptSurface`] or a [`Cone`]; faces are its parallel surfaces at plus and minus half the
+//! thickness.
 
 use crate::bevel::{Strip, strips};
 use crate::cone::Cone;
@@ -51,7 +52,8 @@ enum Surface {
     Cone(Cone),
 }
 
-/// Bent plate: map from material points (u, v, h) to points in space; h is counted from the mid-surface along the upper normal.
+/// Bent plate: map from material points (u, v, h) to points in space; h is counted from the mid-surface along the upper
+/// normal.
 #[derive(Debug, Clone)]
 pub struct Plate {
     cut: Option<CuttingError>,

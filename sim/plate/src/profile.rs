@@ -1,7 +1,7 @@
 //! Plane curve of given curvature: its intrinsic equation integrated by Chebyshev series.
 //!
-//! The tangent angle is the exact integral of a piecewise quintic curvature; positions are integrals of its cosine and sine, taken as
-//! Chebyshev series that are exact to rounding (tested against arcs and Simpson's rule to 1e-12 m).
+//! The tangent angle is the exact integral of a piecewise quintic curvature; positions are integrals of its cosine and
+//! sine, taken as Chebyshev series that are exact to rounding (tested against arcs and Simpson's rule to 1e-12 m).
 
 /// Smooth change of curvature by `change` (1/m) about `at`, over `width` (m): the quintic 6 x^5 - 15 x^4 + 10 x^3.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -46,7 +46,8 @@ const LONGEST: f64 = 0.05;
 struct Interval {
     middle: f64,
     half: f64,
-    /// Coefficients of x, z, tangent angle and curvature side by side: their recurrences run together. For speed only: `platen demo`.
+    /// Coefficients of x, z, tangent angle and curvature side by side: their recurrences run together. For speed only:
+    /// `platen demo`.
     series: [[f64; 4]; N],
 }
 
@@ -153,7 +154,8 @@ impl Profile {
     }
 }
 
-/// Returns the Chebyshev coefficients of `f` on [-1, 1] by interpolation in the Chebyshev points; coefficient 0 is not halved.
+/// Returns the Chebyshev coefficients of `f` on [-1, 1] by interpolation in the Chebyshev points; coefficient 0 is not
+/// halved.
 fn series(f: impl Fn(f64) -> f64) -> [f64; N] {
     let angle = |j: usize| std::f64::consts::PI * (j as f64 + 0.5) / N as f64;
     let values: [f64; N] = std::array::from_fn(|j| f(angle(j).cos()));

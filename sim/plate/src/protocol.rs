@@ -1,6 +1,7 @@
 //! Messages by which the simulated press serves its plate: one line of JSON per request and per reply, over TCP.
 //!
-//! `{"get":"plate"}` is answered by `{"plate":{...}}`, by `{"plate":null}` while the press is empty, or by `{"error":"..."}`.
+//! `{"get":"plate"}` is answered by `{"plate":{...}}`, by `{"plate":null}` while the press is empty, or by
+//! `{"error":"..."}`.
 
 use crate::PlateState;
 use serde::{Deserialize, Serialize};

@@ -1,7 +1,7 @@
 //! Kinematic forming model: strokes, their planning by equal bend bands, and the plate's handling between strokes.
 //!
-//! A stroke bends a strip by a given angle, of which a given share springs back; there is no moment-curvature law. Equal bands at half
-//! their width from each other add up to a constant curvature.
+//! A stroke bends a strip by a given angle, of which a given share springs back; there is no moment-curvature law.
+//! Equal bands at half their width from each other add up to a constant curvature.
 
 use crate::{Band, Blank, PlateError, PlateState, Pose, Shape};
 use rand_distr::{Distribution, Normal};
@@ -205,7 +205,8 @@ impl Default for Handling {
 }
 
 impl Handling {
-    /// Returns the pose after `strokes` strokes of a plate whose nominal pose is `home`; a pure function of its arguments.
+    /// Returns the pose after `strokes` strokes of a plate whose nominal pose is `home`; a pure function of its
+    /// arguments.
     pub fn place(&self, home: &Pose, strokes: u32) -> Pose {
         let mut rng = Pcg64::new(u128::from(self.seed), u128::from(strokes));
         let mut about = |middle: f64, sigma: f64| middle + scatter(sigma.abs(), &mut rng);

@@ -20,8 +20,8 @@ pub struct Jet {
 }
 
 impl Jet {
-    /// Returns the jet by new parameters (a, b) of which the present ones are functions (chain rule); `jacobian` contains
-    /// `[[d first/da, d first/db], [d second/da, d second/db]]`.
+    /// Returns the jet by new parameters (a, b) of which the present ones are functions (chain rule); `jacobian`
+    /// contains `[[d first/da, d first/db], [d second/da, d second/db]]`.
     pub(crate) fn reparameterized(&self, jacobian: [[f64; 2]; 2]) -> Self {
         let [[a, b], [c, d]] = jacobian;
         Self {

@@ -1,9 +1,9 @@
 //! Surface of a plane section swept along a plane profile: every shape except the cone.
 //!
-//! The profile C(s) lies in the xz plane with curvature k1(s). The section (X(r), Z(r)) with curvature k2(r) lies in its normal
-//! plane: P(s, r) = C(s) + X(r) e_y + Z(r) N(s), where N is the profile's upper normal. A straight section gives cylinders, steps and
-//! parallel bands (isometric); two circles of one radius give a sphere, two circles a torus. Principal
-//! curvatures: k2 along r, k1 cos(b) / (1 - k1 Z) along s, where b is the section's tangent angle.
+//! The profile C(s) lies in the xz plane with curvature k1(s). The section (X(r), Z(r)) with curvature k2(r) lies in
+//! its normal plane: P(s, r) = C(s) + X(r) e_y + Z(r) N(s), where N is the profile's upper normal. A straight section
+//! gives cylinders, steps and parallel bands (isometric); two circles of one radius give a sphere, two circles a torus.
+//! Principal curvatures: k2 along r, k1 cos(b) / (1 - k1 Z) along s, where b is the section's tangent angle.
 
 use crate::profile::Profile;
 use crate::{Jet, Vec3};

@@ -1,4 +1,4 @@
-//! Closed-form checks of every shape: metric, normals, curvature, thickness.
+//! Tests of every shape against closed forms: metric, normals, curvature, thickness.
 
 use platen_sim_plate::{Band, CurvatureStep, Plate, PlateState, Pose, Shape, Side, Vec3};
 

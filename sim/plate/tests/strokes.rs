@@ -1,4 +1,4 @@
-//! Strokes, programmes and documents.
+//! Tests of strokes, programmes and documents.
 #![expect(clippy::unwrap_used, reason = "a test that fails to build its plate must fail")]
 
 use platen_sim_plate::{

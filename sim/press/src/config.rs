@@ -37,7 +37,7 @@ pub struct Config {
     pub p_base: u16,
     /// Address of the H block.
     pub h_base: u16,
-    /// Address of 24 registers for advice, which the program shows and reads for nothing else.
+    /// Address of the 24 advice registers, which the program only displays.
     pub advice_base: Option<u16>,
     /// Modbus unit id.
     pub unit: u8,
@@ -137,8 +137,8 @@ pub enum LinkConfig {
         #[serde(default = "default_baud")]
         baud: u32,
     },
-    /// RTU on a pseudo terminal created by the press: a serial line without hardware. Cutting the connection simulates an
-    /// adapter that is unplugged and returns under another name.
+    /// RTU on a pseudo terminal created by the press: a serial line without hardware. Cutting the connection simulates
+    /// an adapter that is unplugged and returns under another name.
     Pty {
         /// Path of a symbolic link to the terminal, as in `/dev/serial/by-id`.
         device: PathBuf,

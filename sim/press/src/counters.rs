@@ -1,7 +1,7 @@
-//! Counters of a press: the behaviour of its host as seen by the press, on which tests assert.
+//! Counters of a press: the behaviour of its host as observed by the press, on which tests assert.
 //!
-//! [`WriteMonitor`] examines every write as it arrives, so that a result that is published twice or changes under its number is
-//! detected even between two cycles of the program.
+//! [`WriteMonitor`] examines every write as it arrives. A result that is published twice or changes under its number is
+//! therefore detected even between two cycles of the program.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -192,7 +192,8 @@ impl WriteMonitor {
         let words = result_words(host);
         match self.published.get(&identity) {
             None => {
-                // Results lost during a restart of the press leave gaps; a decrease would indicate a lost journal of the host.
+                // Results lost during a restart of the press leave gaps; a decrease would indicate a lost journal of
+                // the host.
                 let step = self.last_seq.map_or(1, |last| seq.wrapping_sub(last));
                 if step == 0 || step > u16::MAX / 2 {
                     counters.wrong(format!("stroke {stroke}: sequence {seq} after {:?}", self.last_seq));

@@ -1,7 +1,8 @@
-//! Ram that is driven to a depth: a plate of fibre steel under a press that errs as presses do, and an operator who orders strokes.
+//! Driven ram: a plate of fibre steel under a press with realistic errors, and an operator who orders strokes to a
+//! depth.
 //!
-//! The steel gives the angle that stays after unloading ([`FibreStrip`]); the plate's shape takes it as a bend band of a third of the die's opening, the
-//! reach of the plastic hinge under three-point bending.
+//! The steel determines the angle that remains after unloading ([`FibreStrip`]). The shape of the plate receives it as
+//! a bend band of a third of the die's opening, the reach of the plastic hinge under three-point bending.
 
 use std::f64::consts::TAU;
 
@@ -10,11 +11,11 @@ use rand_distr::{Distribution as _, Normal, Open01};
 use rand_pcg::Pcg64;
 use serde::{Deserialize, Serialize};
 
-/// Steel, die and ram as they are. Every key has a default.
+/// True properties of steel, die and ram. Every key has a default.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct RamConfig {
-    /// Number of the die set, as told to the host.
+    /// Number of the die set, as reported to the host.
     pub die_id: u16,
     /// Distance between the shoulders.
     pub opening_mm: f64,
@@ -22,13 +23,13 @@ pub struct RamConfig {
     pub yield_mpa: f64,
     /// Standard deviation of the yield strength from plate to plate, share.
     pub yield_scatter: f64,
-    /// The same along a plate.
+    /// Standard deviation of the yield strength along a plate, share.
     pub yield_within: f64,
-    /// The plates are thicker than ordered by this in the mean.
+    /// Mean excess of the plates' thickness over the ordered one.
     pub thicker_mm: f64,
     /// Standard deviation of the thickness from plate to plate.
     pub thickness_scatter_mm: f64,
-    /// The same along a plate.
+    /// Standard deviation of the thickness along a plate.
     pub thickness_within_mm: f64,
     /// Depth at which the ram touches a flat plate of nominal thickness.
     pub zero_mm: f64,
@@ -65,7 +66,7 @@ impl Default for RamConfig {
     }
 }
 
-/// A stroke as the operator orders it.
+/// Stroke ordered by the operator.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct OrderedStroke {
@@ -85,16 +86,16 @@ pub struct OrderedStroke {
 pub struct DrivenRam {
     config: RamConfig,
     strip: FibreStrip,
-    /// Direction of the first stroke, which the strip runs across.
+    /// Direction of the first stroke; the strip runs across it.
     axis_deg: f64,
     press: Press,
     random: Pcg64,
-    /// Depth of the last stroke, as the press tells it.
+    /// Depth of the last stroke, as reported by the press.
     pub told_mm: Option<f64>,
 }
 
 impl DrivenRam {
-    /// Creates the ram with a flat plate; `part` draws its steel.
+    /// Creates the ram with a flat plate; the steel is drawn for `part`.
     #[must_use]
     pub fn new(config: &RamConfig, blank: &Blank, part: u32, axis_deg: f64) -> Self {
         let mut random = Pcg64::new(u128::from(config.seed) << 32 | u128::from(part), 0x72_616d);
@@ -125,11 +126,11 @@ impl DrivenRam {
         self.config.die_id
     }
 
-    /// Presses as ordered, as well as this press can; returns the stroke with the angle that stays.
+    /// Presses as ordered, with the errors of this press; returns the stroke with the angle that remains.
     pub fn press(&mut self, order: &OrderedStroke) -> Stroke {
         let reached_mm = order.depth_mm + draw(self.config.ram_scatter_mm, &mut self.random);
         let place_mm = draw(self.config.place_scatter_mm, &mut self.random) + self.config.off_mark_mm;
-        // A die that lies the other way round counts its places the other way round.
+        // On a die in the opposite direction positions are counted the other way.
         let along = (order.axis_deg - self.axis_deg).to_radians().cos().signum();
         let at_mm = along * order.at_mm + place_mm;
         let length = self.strip.step() * self.strip.curvature().count() as f64;

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use platen_sim_plate::PlateError;
 
-/// Error of a press, by who must act.
+/// Error of a press, by the person who must act.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// Invalid configuration: change it.

@@ -1,4 +1,4 @@
-//! Faults that can be injected: those of the line ([`LineFaults`]) and those of the PLC program ([`StrokeFaults`]).
+//! Faults that can be injected: faults of the line ([`LineFaults`]) and faults of the PLC program ([`StrokeFaults`]).
 //!
 //! All probabilities are 0 by default. Faults are drawn from one seed, so that a run can be repeated.
 
@@ -217,7 +217,8 @@ pub struct StrokePlan {
 }
 
 impl StrokeFaults {
-    /// Draws the faults of the next stroke; each fault draws once, so that changing one probability does not affect the others.
+    /// Draws the faults of the next stroke; each fault draws once, so that changing one probability does not affect the
+    /// others.
     pub fn draw(&self, random: &mut fastrand::Rng) -> StrokePlan {
         let mut hit = |probability: f64| random.f64() < probability;
         StrokePlan {

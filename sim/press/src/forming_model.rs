@@ -1,12 +1,13 @@
 //! Forming model: choice of the next bend and its effect on the plate.
 //!
-//! The forming is kinematic (`platen_sim_plate::Stroke`): prescribed angle and springback share, no moment-curvature law. The first
-//! strokes follow a programme planned for a share of the target's curvature. With [`Strategy::ClosedLoop`] the press stops as soon as
-//! a result passes and, after the programme, corrects the place of the largest template gap.
+//! The forming is kinematic (`platen_sim_plate::Stroke`): prescribed angle and springback share, no moment-curvature
+//! law. The first strokes follow a programme planned for a share of the target's curvature. With
+//! [`Strategy::ClosedLoop`] the press stops as soon as a result passes and, after the programme, corrects the place of
+//! the largest template gap.
 //!
-//! Correction: a template of chord L on a plate that is bent too little everywhere touches in its middle and has gaps at
-//! its ends, so the bend belongs between the plate's middle and the place of the gap. Where the plate is bent too far the
-//! template rests on its ends and has a gap in its middle; there it is bent back. A bend by the angle a in the
+//! Correction: a template of chord L on a plate that is bent too little everywhere touches in its middle and has gaps
+//! at its ends, so the bend belongs between the plate's middle and the place of the gap. Where the plate is bent too
+//! far, the template rests on its ends and has a gap in its middle; there it is bent back. A bend by the angle a in the
 //! middle of the template moves its ends by a L / 4. The press applies half of the closing angle and measures again.
 
 use platen_sim_plate::{Blank, Handling, Plan, PlateState, Pose, Programme, Shape, Stroke};
@@ -30,7 +31,7 @@ pub enum Strategy {
     Programme,
     /// Corrects the place of the largest gap until a result passes.
     ClosedLoop,
-    /// Presses what is ordered at the control port, to a depth, until a result passes.
+    /// Presses to a depth as ordered at the control port, until a result passes.
     Operator,
 }
 
@@ -94,7 +95,7 @@ pub struct FormingModel {
     last: Option<HBlock>,
     corrections: usize,
     ram: DrivenRam,
-    /// Stroke that was ordered and not yet made.
+    /// Stroke that was ordered but not yet made.
     ordered: Option<Stroke>,
 }
 
@@ -130,12 +131,12 @@ impl FormingModel {
         &self.state
     }
 
-    /// Takes the operator's order for the next stroke.
+    /// Accepts the operator's order for the next stroke.
     pub fn order(&mut self, order: &OrderedStroke) {
         self.ordered = Some(self.ram.press(order));
     }
 
-    /// Returns die set and depth of the last stroke, as the press tells them; `None` before a driven stroke.
+    /// Returns die set and depth of the last stroke, as reported by the press; `None` before a driven stroke.
     #[must_use]
     pub fn told(&self) -> Option<(u16, f64)> {
         (self.strategy == Strategy::Operator).then(|| (self.ram.die_id(), self.ram.told_mm.unwrap_or(0.0)))
@@ -183,9 +184,8 @@ impl FormingModel {
         Ok(())
     }
 
-    /// Returns a stroke by half the closing angle: between the plate's middle and the place of the gap, or at
-    /// that place where the plate is bent too far.
-    /// Targets bent in two directions are corrected alternately.
+    /// Returns a stroke by half the closing angle: between the plate's middle and the place of the gap, or at that
+    /// place if the plate is bent too far. Targets bent in two directions are corrected alternately.
     fn correction(&self, last: &HBlock) -> Option<Stroke> {
         let (gap_mm, [u_mm, v_mm]) = (last.gap_max_mm()?, last.gap_at_mm()?);
         if last.sense() == 0 {

@@ -1,8 +1,8 @@
 //! Modbus frames on a byte stream, in TCP and in RTU framing.
 //!
 //! TCP: transaction id, protocol 0, length, unit, PDU (Modbus Messaging on TCP/IP, 3.1.3). RTU: unit, PDU, CRC-16
-//! low byte first (Modbus over Serial Line, 2.5.1). An RTU frame has no length field: that of a request follows from the
-//! function code and, for writes, the byte count.
+//! low byte first (Modbus over Serial Line, 2.5.1). An RTU frame has no length field: that of a request follows from
+//! the function code and, for writes, the byte count.
 
 /// Framing of messages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -117,7 +117,7 @@ pub fn crc16(bytes: &[u8]) -> u16 {
 mod tests {
     use super::*;
 
-    /// Read of 10 registers from 0 at unit 1: the request every Modbus text prints.
+    /// Read of 10 registers from 0 at unit 1: the standard example of a Modbus request.
     const RTU_READ: [u8; 8] = [0x01, 0x03, 0x00, 0x00, 0x00, 0x0A, 0xC5, 0xCD];
 
     #[test]

@@ -1,13 +1,14 @@
-//! Modbus server that simulates a plate press.
+//! Simulated plate press as a Modbus server.
 //!
-//! The press serves the register map PPH-1 over Modbus TCP ("MODBUS Messaging on TCP/IP Implementation Guide V1.0b"), RTU framing over TCP,
-//! or RTU on a serial line; services follow the "MODBUS Application Protocol V1.1b3". Its program ([`program::Program`]) is
-//! the press side of the handshake, executed cyclically as in a PLC. Each stroke bends a simulated plate
-//! ([`forming_model::FormingModel`]), which is served on a second port ([`control`]) to the simulated scanner. [`counters::Counters`]
-//! record the behaviour of the host as seen by the press; tests assert on them. [`faults`] lists the faults that can be injected.
+//! The press serves the register map PPH-1 over Modbus TCP ("MODBUS Messaging on TCP/IP Implementation Guide V1.0b"),
+//! RTU framing over TCP, or RTU on a serial line. The services follow the "MODBUS Application Protocol V1.1b3". Its
+//! program ([`program::Program`]) is the press side of the handshake, executed cyclically as in a PLC. Each stroke
+//! bends a simulated plate ([`forming_model::FormingModel`]), which is served on a second port ([`control`]) to the
+//! simulated scanner. [`counters::Counters`] record the behaviour of the host as observed by the press; tests assert on
+//! them. [`faults`] lists the faults that can be injected.
 //!
-//! **Invariants.** No code is shared with the host: registers, checksum, handshake and framing are written a second time from their
-//! specification. [`press::Press::step`] reads no clock and no socket. Equal seeds give equal faults.
+//! **Invariants.** No code is shared with the host: registers, checksum, handshake and framing are written a second
+//! time from their specification. [`press::Press::step`] reads no clock and no socket. Equal seeds give equal faults.
 //!
 //! ```no_run
 //! # async fn example() -> Result<(), platen_sim_press::Error> {

@@ -1,7 +1,7 @@
 //! Relay between host and Modbus server: TCP, RTU over TCP or a serial line, with fault injection.
 //!
-//! Each client has its own connection to the private Modbus server, and one message at a time is relayed. Faults are injected
-//! here, at the level of requests and answers, and not in a proxy of bytes.
+//! Each client has its own connection to the private Modbus server, and one message at a time is relayed. Faults are
+//! injected at the level of requests and answers, not in a proxy of bytes.
 
 use std::io;
 use std::net::SocketAddr;

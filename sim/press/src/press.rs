@@ -1,7 +1,7 @@
-//! Press: ram, plate, program and injected faults, advanced by one controller cycle at a time.
+//! Simulated press: ram, plate, program and injected faults, advanced by one controller cycle at a time.
 //!
-//! [`Press::step`] reads the H block from the registers, runs the program, moves the ram and writes the P block. It is a function of
-//! the press, the registers and the time, so that tests run it without a clock or a socket.
+//! [`Press::step`] reads the H block from the registers, runs the program, moves the ram and writes the P block. It is
+//! a function of the press, the registers and the time, so that tests run it without a clock or a socket.
 
 use std::time::Duration;
 
@@ -190,7 +190,7 @@ impl Press {
         Ok(())
     }
 
-    /// Takes the operator's order for the next stroke.
+    /// Accepts the operator's order for the next stroke.
     ///
     /// # Errors
     /// [`Error::Refused`] while a stroke is being made or measured.

@@ -211,7 +211,8 @@ impl Program {
         self.host_beat = Some(beat);
     }
 
-    /// Returns whether the host has echoed the stroke number; a rescan has the same number, so the host must also be busy with it or done.
+    /// Returns whether the host has echoed the stroke number; a rescan has the same number, so the host must also be
+    /// busy with it or done.
     fn accepts(&self, host: &HBlock, request: &Request) -> bool {
         host.word(h::ACK_STROKE_ID) == self.stroke_id
             && host.word(h::SESSION_ECHO) == self.session_id

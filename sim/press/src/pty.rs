@@ -1,8 +1,9 @@
 //! Pseudo terminal as a serial line: the host opens its name, the press uses the other end.
 //!
-//! A terminal that is not open at the other end reports hang-up permanently, which would keep an event loop busy. Two threads
-//! therefore read and write it with blocking calls; they end, and with them the terminal, when the press drops its end. The link is
-//! removed first, as that of an unplugged adapter is: the terminal's number may be reused a moment later.
+//! A terminal that is not open at the other end reports hang-up permanently, which would keep an event loop busy.
+//! Therefore two threads read and write it with blocking calls. The threads, and with them the terminal, end when the
+//! press drops its end. The link is removed first, like that of an unplugged adapter, because the terminal's number may
+//! be reused a moment later.
 
 use std::io::{ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};

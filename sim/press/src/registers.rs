@@ -1,8 +1,8 @@
-//! Register map PPH-1 (plate press - host, version 1), written from its specification and deliberately not shared with the
-//! host: an offset that is wrong on one side shows as wrong figures between the two.
+//! Register map PPH-1 (plate press - host, version 1), written from its specification and deliberately not shared with
+//! the host: an offset that is wrong on one side causes wrong figures between the two.
 //!
-//! Holding registers only. The press writes the P block (32 words) and reads the H block (64 words); the host may write the H block
-//! only. All words are 16 bit; 32-bit values have the high word first.
+//! Holding registers only. The press writes the P block (32 words) and reads the H block (64 words); the host may write
+//! the H block only. All words are 16 bit; 32-bit values have the high word first.
 
 use serde::Serialize;
 

@@ -1,10 +1,11 @@
-//! Modbus server on its private port: holding-register services (functions 3, 6 and 16 of "MODBUS Application Protocol V1.1b3") and
-//! the checks of each connection's writes.
+//! Modbus server on its private port: holding-register services (functions 3, 6 and 16 of "MODBUS Application Protocol
+//! V1.1b3") and the checks of each connection's writes.
 //!
-//! A connection ends with the run of the controller that accepted it: a request that is under way at a restart is neither executed nor
-//! answered, as on a real controller, whose sockets do not outlive it (RFC 9293, 3.5.1, half-open connections). A host cannot avoid
-//! such a request, since it cannot know of the restart yet. It can avoid a write after it has read registers without a valid map:
-//! every write on a connection is counted whose last read of the P block contained another map version.
+//! A connection ends with the run of the controller that accepted it. A request in transit at a restart is neither
+//! executed nor answered, as on a real controller, whose sockets do not outlive it (RFC 9293, 3.5.1, half-open
+//! connections). A host cannot avoid such a request, because it has not yet been able to detect the restart. It can
+//! avoid a write after it has read registers without a valid map: a write is counted if the last read of the P block on
+//! its connection contained another map version.
 
 use std::future::{Ready, ready};
 use std::sync::Arc;

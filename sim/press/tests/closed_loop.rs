@@ -1,4 +1,5 @@
-//! Closed loop: the press bends by the results until the template fits; the results are computed from the closed-form plate.
+//! Closed-loop test: the press bends by the results until the template fits; the results are computed from the
+//! closed-form plate.
 #![expect(clippy::unwrap_used, reason = "a plate that cannot be bent must fail the test")]
 
 use platen_sim_plate::{Plan, Plate, Shape};
@@ -11,7 +12,8 @@ const LIMIT: f64 = 0.003;
 /// Points on each half of a template: every 50 mm, between which the plates here rise by less than 0.05 mm.
 const N: i32 = 20;
 
-/// Contact of a template of the target's radius at one place of the plate: largest gap, its position along the line, and the sense.
+/// Contact of a template of the target's radius at one place of the plate: largest gap, its position along the line,
+/// and the sense.
 #[derive(Clone, Copy, Debug)]
 struct Gap {
     gap: f64,
@@ -49,7 +51,8 @@ fn lay(radius: f64, surface: impl Fn(f64) -> f64) -> Gap {
     Gap { gap: gap(worst), at: worst.0, sense }
 }
 
-/// Returns the result of the worst template on lines along u and along v through the plate's middle, centred at `centres`.
+/// Returns the result of the worst template on lines along u and along v through the plate's middle, centred at
+/// `centres`.
 fn measure(model: &FormingModel, radii: [Option<f64>; 2], centres: &[f64]) -> HBlock {
     let plate = Plate::new(model.state()).unwrap();
     let half = 2.0;

@@ -1,4 +1,4 @@
-//! Links of the press and faults on them.
+//! Tests of the links of the press, and of faults on them.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod host;

@@ -1,4 +1,4 @@
-//! Press side of the handshake in virtual time: no clock, no socket.
+//! Tests of the press side of the handshake in virtual time, without clock and socket.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use std::time::Duration;

@@ -1,4 +1,4 @@
-//! The press against a minimal host, over real sockets.
+//! Tests of the press against a minimal host, over real sockets.
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod host;

@@ -29,7 +29,8 @@ impl Bounds {
         (self.min + self.max) / 2.0
     }
 
-    /// Returns the range at which a ray enters (0 when it starts inside); `None` when it misses or enters beyond `limit` (slab method).
+    /// Returns the range at which a ray enters (0 when it starts inside); `None` when it misses or enters beyond
+    /// `limit` (slab method).
     fn entry(&self, ray: &Ray, inverse: &Vec3, limit: f64) -> Option<f64> {
         let (mut near, mut far) = (0.0_f64, limit);
         for k in 0..3 {
@@ -98,8 +99,8 @@ impl Tree {
         self.build(bounds, first + middle, end);
     }
 
-    /// Calls `visit` for every item whose box the ray enters before `limit`, near boxes first. `visit` returns the range of
-    /// the nearest hit so far, beyond which no further item is visited.
+    /// Calls `visit` for every item whose box the ray enters before `limit`, near boxes first. `visit` returns the
+    /// range of the nearest hit so far, beyond which no further item is visited.
     pub(crate) fn visit(&self, ray: &Ray, mut limit: f64, mut visit: impl FnMut(u32, f64) -> f64) {
         let inverse = ray.direction.map(|c| 1.0 / c);
         let mut stack = [(0_u32, 0.0_f64); STACK];

@@ -1,8 +1,8 @@
 //! Resolutions, measuring rates and scan times of a phase scanner of the FARO Focus family.
 //!
-//! A mirror rotates about a horizontal axis while the head rotates about the vertical. Each turn of the mirror writes one column on the
-//! front face and one on the back face, so that half a turn of the head covers the full circle. Figures are from published control code
-//! and the maker's table, whose times are reproduced to a second.
+//! A mirror rotates about a horizontal axis while the head rotates about the vertical. Each turn of the mirror writes
+//! one column on the front face and one on the back face, so that half a turn of the head covers the full circle.
+//! Figures are from published control code and the maker's table, whose times are reproduced to a second.
 
 use std::f64::consts::{PI, TAU};
 
@@ -12,8 +12,8 @@ const FULL_COLUMNS: f64 = 40_960.0;
 /// Highest mirror frequency, Hz. The permitted pairs of resolution and rate are exactly those below it.
 const FASTEST_MIRROR: f64 = 97.0;
 
-/// Rate at which the data sheet states its noise, points per second, and that noise at 10 m on mill scale at 60 degrees,
-/// metres: 0.6 mm at 90 % reflectivity, weaker echoes by the power 0.35.
+/// Rate at which the data sheet states its noise, points per second, and that noise at 10 m on mill scale at 60
+/// degrees, metres: 0.6 mm at 90 % reflectivity, weaker echoes by the power 0.35.
 const QUIET: (f64, f64) = (122e3, 1.06e-3);
 
 /// Time until the mirror is at speed, seconds.
@@ -68,7 +68,8 @@ pub enum DeviceError {
 }
 
 impl Device {
-    /// Creates a mode of resolution 1/`divisor`, measuring rate, and noise compression (1: none; n: n^2 samples are averaged).
+    /// Creates a mode of resolution 1/`divisor`, measuring rate, and noise compression (1: none; n: n^2 samples are
+    /// averaged).
     ///
     /// # Errors
     /// [`DeviceError`] with the permitted values.
@@ -106,8 +107,8 @@ impl Device {
         [(columns * 152.5 / 360.0).round() as u32, columns.round() as u32]
     }
 
-    /// Returns the sweep time of a horizontal window (radians), seconds. Up to half a circle only one face of each mirror turn
-    /// is used; a vertical window saves no time.
+    /// Returns the sweep time of a horizontal window (radians), seconds. Up to half a circle only one face of each
+    /// mirror turn is used; a vertical window saves no time.
     pub fn sweep_s(&self, width: f64) -> f64 {
         let full = FULL_COLUMNS / (2.0 * self.mirror_hz() * f64::from(self.divisor));
         full * (width / PI).min(1.0)
@@ -123,8 +124,8 @@ impl Device {
         SPIN_UP + self.sweep_s(width) * done
     }
 
-    /// Returns the standard deviation of a range at 10 m as defined by [`crate::Instrument::range_sigma`]: proportional to the root of
-    /// the rate and inversely to compression.
+    /// Returns the standard deviation of a range at 10 m as defined by [`crate::Instrument::range_sigma`]: proportional
+    /// to the root of the rate and inversely to compression.
     pub fn range_sigma(&self) -> f64 {
         let (rate, sigma) = QUIET;
         sigma * (self.rate / rate).sqrt() / f64::from(self.averaged)

@@ -5,8 +5,8 @@ use crate::ray::{Hit, Label};
 /// Parameters of the error model. Lengths in metres, angles in radians.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Instrument {
-    /// Standard deviation of a range at 10 m on mill-scaled steel at 60 degrees incidence, a typical view of a plate. Data
-    /// sheets: 0.5 mm with filtering to 1.7 mm at full rate.
+    /// Standard deviation of a range at 10 m on mill-scaled steel at 60 degrees incidence, a typical view of a plate.
+    /// Data sheets: 0.5 mm with filtering to 1.7 mm at full rate.
     pub range_sigma: f64,
     /// Degrees of freedom of the range error (Student's t, scaled to the same variance); `None`: normal distribution.
     pub tail_dof: Option<f64>,
@@ -14,7 +14,8 @@ pub struct Instrument {
     pub wide_errors: Option<WideErrors>,
     /// Full angular width of the beam at 1/e^2 of its intensity.
     pub footprint: f64,
-    /// Whether the beam has power beyond that width, to one and a half of it. Only cells next to an edge of the scene are mixed, whatever the step.
+    /// Whether the beam has power beyond that width, to one and a half of it. Only cells next to an edge of the scene
+    /// are mixed, whatever the step.
     pub wings: bool,
     /// Standard deviation of each reported angle against the true direction of the beam.
     pub angular_sigma: f64,
@@ -36,7 +37,8 @@ pub struct Instrument {
     pub seed: u64,
 }
 
-/// Contaminated normal distribution of the range error (Tukey 1960): a share of the ranges has a larger standard deviation.
+/// Contaminated normal distribution of the range error (Tukey 1960): a share of the ranges has a larger standard
+/// deviation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WideErrors {
     /// Share of the ranges, 0 to 1.
@@ -59,8 +61,8 @@ pub struct Cyclic {
 /// Errors of a scan of two faces: each turn of the mirror measures a column of both, half a turn of the head apart.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Faces {
-    /// First column of the second face by increasing azimuth: of the back face, or of the front face where the head rotates
-    /// clockwise.
+    /// First column of the second face by increasing azimuth: of the back face, or of the front face where the head
+    /// rotates clockwise.
     pub seam_column: u32,
     /// Collimation error: angle of the beam against the mirror's plane; changes sign between the faces.
     pub collimation: f64,
@@ -128,8 +130,8 @@ const REFERENCE_STRENGTH: f64 = 0.35 * 0.5;
 /// Share of the variance at 10 m that is independent of range (jitter of the electronics).
 const RANGE_FLOOR: f64 = 0.25;
 
-/// Exponent of the echo's strength in the standard deviation. A data sheet with 0.6 mm at 90 % and 1.2 mm at 10 % (10 m) gives
-/// 0.32, at 25 m 0.38.
+/// Exponent of the echo's strength in the standard deviation. A data sheet with 0.6 mm at 90 % and 1.2 mm at 10 % (10
+/// m) gives 0.32, at 25 m 0.38.
 const STRENGTH_POWER: f64 = 0.35;
 
 impl Instrument {
@@ -141,7 +143,8 @@ impl Instrument {
         self.range_sigma * by_range * weak
     }
 
-    /// Returns the probability that an echo is lost: the constant dropout, weakness of the echo, and the specular lobe combined.
+    /// Returns the probability that an echo is lost: the constant dropout, weakness of the echo, and the specular lobe
+    /// combined.
     pub(crate) fn loss(&self, hit: &Hit, strength: f64) -> f64 {
         if self.dropout == 0.0 {
             return 0.0;

@@ -5,7 +5,8 @@ use platen_sim_plate::{Plate, Side, Vec3};
 /// Lowest elevation of a scanner, degrees: its own base obstructs the view below.
 pub const LOWEST_DEG: f64 = -62.5;
 
-/// Regular lattice of directions, radians: columns by increasing azimuth (counter-clockwise from +x), rows from the top down.
+/// Regular lattice of directions, radians: columns by increasing azimuth (counter-clockwise from +x), rows from the top
+/// down.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SimLattice {
     /// Azimuth of column 0.
@@ -23,8 +24,8 @@ pub struct SimLattice {
 }
 
 impl SimLattice {
-    /// Returns the lattice of one step that covers azimuths from `azimuth_start` over `azimuth_width` and elevations between
-    /// `elevation_min` and `elevation_max`. At least 2 x 2 cells.
+    /// Returns the lattice of one step that covers azimuths from `azimuth_start` over `azimuth_width` and elevations
+    /// between `elevation_min` and `elevation_max`. At least 2 x 2 cells.
     pub fn covering(
         azimuth_start: f64,
         azimuth_width: f64,
@@ -43,8 +44,8 @@ impl SimLattice {
         }
     }
 
-    /// Returns the lattice of one step that covers `points` (scanner frame) and `margin` radians around them. The points must
-    /// lie within half a turn.
+    /// Returns the lattice of one step that covers `points` (scanner frame) and `margin` radians around them. The
+    /// points must lie within half a turn.
     pub fn around(points: &[Vec3], margin: f64, step: f64) -> Self {
         let middle = points.iter().sum::<Vec3>();
         let middle = middle.y.atan2(middle.x);
@@ -61,7 +62,8 @@ impl SimLattice {
         Self::covering(start, width, elevation[0] - margin, elevation[1] + margin, step)
     }
 
-    /// Returns the lattice that covers a plate and `margin` radians around it, or the place of a plate in an empty press.
+    /// Returns the lattice that covers a plate and `margin` radians around it, or the place of a plate in an empty
+    /// press.
     pub fn of_plate(plate: Option<&Plate>, margin: f64, step: f64) -> Self {
         Self::around(&outline(plate), margin, step).on_encoder()
     }

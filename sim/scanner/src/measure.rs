@@ -147,14 +147,15 @@ impl View<'_> {
         out
     }
 
-    /// Returns the echo of a ray; its strength is relative to a white wall at normal incidence at the same distance (Lambert's law).
+    /// Returns the echo of a ray; its strength is relative to a white wall at normal incidence at the same distance
+    /// (Lambert's law).
     fn echo(&self, hit: &Hit) -> Echo {
         Echo { hit: *hit, strength: self.scene.reflectivity(hit) * hit.cos_incidence, mixed: false }
     }
 
-    /// Returns the echo of the whole footprint. A phase scanner integrates the echoes of the whole spot:
-    /// the range is the mean, weighted by power, which falls with the square of the distance. The samples of the spot are turned by
-    /// an angle. The echo is that of the middle ray where the rim of the spot lies on one surface with it.
+    /// Returns the echo of the whole footprint. A phase scanner integrates the echoes of the whole spot: the range is
+    /// the mean, weighted by power, which falls with the square of the distance. The samples of the spot are turned by
+    /// an angle. If the rim of the spot and the middle ray lie on one surface, the echo is that of the middle ray.
     fn footprint_echo(&self, ray: &Ray, middle: Option<Hit>, turned: f64) -> Option<Echo> {
         let level = ray.direction.cross(&Vec3::z()).try_normalize(1e-9).unwrap_or(Vec3::x());
         let upright = level.cross(&ray.direction);
@@ -203,8 +204,8 @@ impl View<'_> {
         wide.map_or(1.0, |wide| wide.factor)
     }
 
-    /// Simulates the receiver: returns state, range and intensity of an echo. `spread` is a factor of the range's standard
-    /// deviation.
+    /// Simulates the receiver: returns state, range and intensity of an echo. `spread` is a factor of the range's
+    /// standard deviation.
     fn receive(&self, column: u32, echo: Option<Echo>, spread: f64, rng: &mut Pcg64) -> (SimState, f64, u16) {
         // Every cell draws the same number of deviates, with or without an echo.
         let lost = unit_interval(rng);
@@ -255,7 +256,7 @@ const SAMPLES: usize = 61;
 /// For speed only: `platen demo`.
 const RIM: usize = 13;
 
-/// Where a beam with wings is truncated, in its 1/e^2 radii: beyond lies 1 % of the power.
+/// Radius at which a beam with wings is truncated, in 1/e^2 radii: 1 % of the power lies beyond.
 const WINGED_RADIUS: f64 = 1.5;
 
 /// Gaussian beam truncated at its 1/e^2 radius.
@@ -264,8 +265,8 @@ static SPOT: LazyLock<[Sample; SAMPLES]> = LazyLock::new(|| gaussian_beam(1.0));
 /// Gaussian beam with wings.
 static WINGED_SPOT: LazyLock<[Sample; SAMPLES]> = LazyLock::new(|| gaussian_beam(WINGED_RADIUS));
 
-/// Samples a Gaussian beam truncated at a radius in equal areas on Vogel's spiral (1979). No two samples lie at one distance from an edge: the power beyond it changes
-/// in small steps, whatever its direction.
+/// Samples a Gaussian beam truncated at a radius in equal areas on Vogel's spiral (1979). No two samples have the same
+/// distance from an edge, so the power beyond the edge changes in small steps, whatever its direction.
 fn gaussian_beam(truncated: f64) -> [Sample; SAMPLES] {
     let golden_angle = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
     std::array::from_fn(|k| {
@@ -275,7 +276,8 @@ fn gaussian_beam(truncated: f64) -> [Sample; SAMPLES] {
     })
 }
 
-/// Returns the angle by which the samples of a cell's beam are turned, another one from cell to cell: their steps do not add up along an edge.
+/// Returns the angle by which the samples of a cell's beam are turned. It differs from cell to cell, so that the steps
+/// do not add up along an edge.
 fn turned(column: u32, row: usize) -> f64 {
     let part = 0.618_033_988_749_895 * row as f64 + 0.414_213_562_373_095 * f64::from(column);
     std::f64::consts::TAU * part.fract()
@@ -329,7 +331,7 @@ mod tests {
         }
     }
 
-    /// In each direction: largest error of a beam, and mean error of a hundred turned ones.
+    /// In each direction: the largest error of one beam, and the mean error of a hundred turned ones.
     #[test]
     fn the_power_beyond_an_edge_is_that_of_a_gaussian_beam() {
         let offs: Vec<f64> = (-9..=9).map(|k| 0.1 * f64::from(k)).collect();

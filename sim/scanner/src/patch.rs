@@ -1,5 +1,5 @@
-//! Ray intersection with the curved faces of a plate (two faces, four sides of one to three strips), by Newton's method on
-//! parametric patches.
+//! Ray intersection with the curved faces of a plate (two faces, four sides of one to three strips), by Newton's method
+//! on parametric patches.
 
 use crate::bounds::Bounds;
 use crate::ray::{Label, Ray};
@@ -34,7 +34,7 @@ pub(crate) struct Patch {
     face: Face,
     from: [f64; 2],
     to: [f64; 2],
-    /// Where every search begins. For speed only: `platen demo`.
+    /// Start of every search. Stored for speed only: `platen demo`.
     middle: FacePoint,
 }
 
@@ -79,8 +79,8 @@ impl Face {
         }
     }
 
-    /// Returns the point of the ordered rectangle and the height of the parameters (a, b). On a bevel the parameter along the
-    /// side is compressed so that neighbouring sides meet in a mitre.
+    /// Returns the point of the ordered rectangle and the height of the parameters (a, b). On a bevel the parameter
+    /// along the side is compressed so that neighbouring sides meet in a mitre.
     fn place(self, plate: &Plate, a: f64, b: f64) -> [f64; 3] {
         let (width, height, half) = (plate.width(), plate.height(), plate.thickness() / 2.0);
         let Self::Side(side, strip, _) = self else {
@@ -167,9 +167,9 @@ impl Patch {
         Bounds::of(points, MARGIN)
     }
 
-    /// Returns the point where the ray enters the plate through this patch: a root of X(a, b) = origin + t direction by Newton's
-    /// method from the patch's middle. A patch is small against its radii, so that a root on it is reached in three
-    /// or four steps; a root elsewhere belongs to another patch. Near a horizon the ray may leave through the
+    /// Returns the point where the ray enters the plate through this patch: a root of X(a, b) = origin + t direction by
+    /// Newton's method from the patch's middle. A patch is small against its radii, so that a root on it is reached in
+    /// three or four steps; a root elsewhere belongs to another patch. Near a horizon the ray may leave through the
     /// patch through which it entered; the other root is then searched from the scanner's side.
     pub(crate) fn cast(&self, plate: &Plate, ray: &Ray) -> Option<PatchHit> {
         let first = self.root(plate, ray, self.middle);
@@ -196,7 +196,8 @@ impl Patch {
         root.normal.dot(&ray.direction) * self.face.outward() > 0.0
     }
 
-    /// Runs Newton's method from `start`; a root that is not on this patch is found roughly, and not at all beyond two patch lengths.
+    /// Runs Newton's method from `start`. A root outside this patch is found roughly, and not at all beyond two patch
+    /// lengths.
     fn root(&self, plate: &Plate, ray: &Ray, start: FacePoint) -> Option<Root> {
         let mut at = start;
         for _ in 0..12 {

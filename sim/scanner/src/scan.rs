@@ -72,7 +72,8 @@ pub fn scan_all(
     columns
 }
 
-/// Runs `work` for every column of a range and returns the results in order; neighbouring columns run on different threads.
+/// Runs `work` for every column of a range and returns the results in order; neighbouring columns run on different
+/// threads.
 fn parallel<T: Send>(columns: Range<u32>, threads: usize, work: impl Fn(u32) -> T + Sync) -> Vec<T> {
     let threads = threads.clamp(1, columns.len().max(1));
     if threads == 1 {

@@ -42,7 +42,8 @@ impl Scene {
         Self { plate, patches, patch_tree, plate_reflectivity: PLATE_REFLECTIVITY, solids, solid_tree }
     }
 
-    /// Returns the scene with a plate whose faces have this diffuse reflectivity, 0 to 1: rust is dark, primer is bright.
+    /// Returns the scene with a plate whose faces have this diffuse reflectivity, 0 to 1: rust is dark, primer is
+    /// bright.
     #[must_use]
     pub fn with_plate_reflectivity(self, plate_reflectivity: f64) -> Self {
         Self { plate_reflectivity, ..self }

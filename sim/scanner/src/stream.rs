@@ -1,12 +1,12 @@
-//! Bridge: the server of the scan bridge protocol beside a scanner, for tests of hosts and drivers.
+//! Scan bridge: the server of the scan bridge protocol beside a scanner, for tests of hosts and drivers.
 //!
-//! It is written from the protocol's page alone, so that an error of the driver and one of the page do not cancel. A [`Bridge`]
-//! serves the scans of a [`Head`]: of a [`RayCastHead`], which casts rays at a simulated plate, or of a [`Recording`] of earlier
-//! frames. Scans are spooled to disk while they are measured and sent, so that their size costs no memory and a driver that is slow or
-//! reconnects receives every column.
+//! It is written from the protocol document alone, so that an error of the driver and one of the document do not
+//! cancel. A [`Bridge`] serves the scans of a [`Head`]: a [`RayCastHead`], which casts rays at a simulated plate, or a
+//! [`Recording`] of earlier frames. Scans are spooled to disk while they are measured and sent. Their size therefore
+//! needs no memory, and a driver that is slow or reconnects receives every column.
 //!
-//! A scan takes the time of a real scanner, scaled by a factor. [`FaultKind`] lists the faults of link, bridge and scanner;
-//! errors of the measurement (noise, bias, warm-up, two faces) belong to [`crate::Instrument`].
+//! A scan takes the time of a real scanner, scaled by a factor. [`FaultKind`] lists the faults of link, bridge and
+//! scanner; errors of the measurement (noise, bias, warm-up, two faces) belong to [`crate::Instrument`].
 
 mod bridge;
 mod config;

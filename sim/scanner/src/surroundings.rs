@@ -21,7 +21,7 @@ pub struct Surroundings {
     pub person_at_corner: bool,
     /// The chain of a crane hangs in front of the plate and hides a strip.
     pub chain: bool,
-    /// The table ends so close behind the plate that it shows beyond the far edges by this angle, radians.
+    /// The table ends so close behind the plate that it is visible beyond the far edges by this angle, radians.
     pub strip: Option<f64>,
 }
 
@@ -145,10 +145,10 @@ impl Place {
         self.upright(0.0, 0.0, height, [edge, edge, height])
     }
 
-    /// Returns a table parallel to the plate of which `strip`, an angle, shows beyond those edges whose surroundings are seen over the plate; it
-    /// stands out from under the other edges.
+    /// Returns a table parallel to the plate. A strip of it, given as an angle, is visible beyond those edges whose
+    /// surroundings are seen over the plate; it extends from under the other edges.
     fn narrow_table(&self, plate: &Plate, strip: f64) -> Solid {
-        /// What stands out, metres.
+        /// Extent beyond the other edges, metres.
         const BESIDE: f64 = 0.3;
         let corners = plate.corners();
         let along = corners[1] - corners[0];
@@ -175,7 +175,8 @@ impl Place {
         Solid::upright(Vec3::new(middle.x, middle.y, self.floor + height / 2.0), edges, yaw)
     }
 
-    /// Returns where a person stands that hides the plate's nearest corner: distances away from the middle and to the left.
+    /// Returns the position of a person who hides the plate's nearest corner: distances away from the middle and to the
+    /// left.
     fn before_nearest_corner(&self, plate: &Plate) -> [f64; 2] {
         /// Of the way from the scanner to the corner.
         const SHARE: f64 = 0.97;

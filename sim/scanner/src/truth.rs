@@ -38,14 +38,15 @@ impl CellCounts {
     }
 }
 
-/// Returns the ground truth as a document: the plate's state, corners, markers, edges and two grids of the upper face (metres, scanner
-/// frame), curvature of the mid-surface (1/m), and numbers of cells.
+/// Returns the ground truth as a document: the plate's state, corners, markers, edges and two grids of the upper face
+/// (metres, scanner frame), curvature of the mid-surface (1/m), and numbers of cells.
 ///
-/// `edges` are those of the face, v = 0, u = W, v = H, u = 0, counter-clockwise, with at most 50 mm between points: on a bevelled plate
-/// inside of the rectangle. Corners and grids are those of the rectangle, and of the face's continuation where it is bevelled.
+/// `edges` are those of the face, v = 0, u = W, v = H, u = 0, counter-clockwise, with at most 50 mm between points: on
+/// a bevelled plate inside of the rectangle. Corners and grids are those of the rectangle, and of the face's
+/// continuation where it is bevelled.
 ///
-/// Grids are regular over the rectangle, edges included, v outer, u inner: `grid` has 21 x 21 points with curvatures, `face` is
-/// finer, with at most 50 mm between points, positions only. The result is null when the scene has no plate.
+/// Grids are regular over the rectangle, edges included, v outer, u inner: `grid` has 21 x 21 points with curvatures,
+/// `face` is finer, with at most 50 mm between points, positions only. The result is null when the scene has no plate.
 pub fn truth_document(state: &PlateState, scene: &Scene, counts: &CellCounts) -> Value {
     let Some(plate) = scene.plate() else { return Value::Null };
     let corners: Vec<[f64; 3]> = plate.corners().map(Into::into).to_vec();

@@ -1,4 +1,4 @@
-//! Rays against exact geometry: every ray hits its target, at the right range.
+//! Tests of rays against exact geometry: every ray hits its target, at the right range.
 #![expect(clippy::unwrap_used, reason = "a test that fails to build its plate must fail")]
 
 use platen_sim_plate::{Band, Plate, PlateState, Pose, Shape, Side, Vec3};
@@ -129,7 +129,7 @@ fn flanks_of_a_bevel_lie_at_their_angle_and_close_the_plate() {
         let plate = bevelled(shape.clone());
         let scene = Scene::of(Some(plate.clone()), Vec::new());
         let (w, h) = (plate.width(), plate.height());
-        // Over the edges and corners, across the strip in which flanks and root face show.
+        // Over the edges and corners, across the strip in which flanks and root face are visible.
         let mut strips = [0; 3];
         for side in Side::ALL {
             for i in 0..=300 {

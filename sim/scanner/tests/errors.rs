@@ -1,4 +1,4 @@
-//! Each error of the instrument alone, against its model.
+//! Tests of each error of the instrument alone, against its model.
 #![expect(clippy::unwrap_used, reason = "a test that fails to build its plate must fail")]
 
 use platen_sim_plate::{Plate, PlateState, Pose, Vec3};
@@ -111,7 +111,7 @@ fn a_share_of_the_ranges_has_wide_errors_and_the_others_keep_theirs() {
     assert!((changed / n - 0.05_f64).abs() < 0.01, "{changed} of {n}");
 }
 
-/// A quarter of the reflectivity: half the amplitude, and the noise of a weaker echo (4^0.35).
+/// At a quarter of the reflectivity the amplitude is half, and the noise is that of a weaker echo (4^0.35).
 #[test]
 fn a_dark_plate_is_measured_with_more_noise() {
     let of = |reflectivity: f64| {
@@ -185,7 +185,8 @@ fn ranges_mix_where_the_footprint_straddles_an_edge() {
 
 #[test]
 fn a_beam_with_wings_mixes_beyond_its_width() {
-    // The columns on both sides of that at the edge are 0.22 mrad from it, 1.1 of the beam's radii; one of them has the other surface for a neighbour.
+    // The columns on both sides of the one at the edge are 0.22 mrad from it, 1.1 of the beam's radii; one of them has
+    // a neighbour on the other surface.
     let mixed = |wings: bool| {
         let cells = at_an_edge(0.0125, wings);
         let beside = cells.into_iter().filter(|(azimuth, _)| (0.21e-3..0.23e-3).contains(azimuth));
@@ -195,8 +196,8 @@ fn a_beam_with_wings_mixes_beyond_its_width() {
     assert_eq!(mixed(false), 0);
 }
 
-/// Scans a board's edge at y = 0, 3 m before a wall, with a beam of 0.2 mrad to each side. Returns per cell how far from the edge it is, radians, and whether
-/// both surfaces are mixed; its range tells the same.
+/// Scans a board's edge at y = 0, 3 m before a wall, with a beam of 0.2 mrad to each side. Returns for each cell its
+/// distance from the edge, radians, and whether both surfaces are mixed, which is also visible in its range.
 fn at_an_edge(step_deg: f64, wings: bool) -> Vec<(f64, bool)> {
     let board = Solid::upright(Vec3::new(7.0, 1.0, 0.0), Vec3::new(0.02, 2.0, 2.0), 0.0);
     let wall = Solid::upright(Vec3::new(10.1, 0.0, 0.0), Vec3::new(0.2, 4.0, 4.0), 0.0);
@@ -239,7 +240,7 @@ fn faces_disagree_by_twice_the_collimation_and_warm_up_scatters() {
     let scene = target(10.0, 60.0);
     let columns = scan_all(&scene, &narrow(0.01), &instrument, 2);
     assert!(columns.iter().all(|c| c.back_face == (c.index >= 100)));
-    // Seen in the same direction, the back face's scanner stands 1 mm higher: 1 mm tan(60) in range.
+    // In the same direction, the scanner of the back face stands 1 mm higher: 1 mm tan(60) in range.
     let perfect = scan_all(&scene, &narrow(0.01), &Instrument::perfect(), 2);
     let step = |index: usize| columns[index].truth[100].range - perfect[index].truth[100].range;
     assert!(step(50).abs() < 1e-5);

@@ -1,4 +1,4 @@
-//! Files of every format contain the scan.
+//! Tests that files of every format contain the scan.
 #![expect(clippy::unwrap_used, reason = "a test that cannot read its file must fail")]
 
 use e57::{CartesianCoordinate, E57Reader, SphericalCoordinate};

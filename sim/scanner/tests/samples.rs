@@ -1,4 +1,5 @@
-//! Comparison with an independent generator of the same scenes: the same plate in the same lattice has similar error statistics.
+//! Comparison with an independent generator of the same scenes: the same plate in the same lattice has similar error
+//! statistics.
 #![expect(clippy::unwrap_used, reason = "a test that cannot read its samples must fail")]
 
 use e57::{CartesianCoordinate, E57Reader};
@@ -89,8 +90,8 @@ fn ours(scene: &Scene, lattice: &SimLattice, instrument: &Instrument) -> Figures
     figures
 }
 
-/// Returns the standard deviation along the beam of the sample's points on the plate, 30 mm from its edges, and how many
-/// lie farther than 10 mm from it.
+/// Returns the standard deviation along the beam of the sample's points on the plate, 30 mm from its edges, and how
+/// many lie farther than 10 mm from it.
 fn residual_of_file(path: &Path, plate: &Plate) -> (f64, usize) {
     let mut reader = E57Reader::from_file(path).unwrap();
     let cloud = reader.pointclouds().remove(0);

@@ -4,7 +4,8 @@ use super::{FileOrder, SimScan};
 use crate::measure::INTENSITY_MAX;
 use std::io::{Result, Write};
 
-/// Writes a PTX file. Line 1 is the number of columns, line 2 that of rows, the fast index. Position and matrix are the identity.
+/// Writes a PTX file. Line 1 is the number of columns, line 2 that of rows, the fast index. Position and matrix are the
+/// identity.
 pub(super) fn write(scan: &SimScan, out: &mut impl Write, crlf: bool, order: FileOrder) -> Result<()> {
     let end = if crlf { "\r\n" } else { "\n" };
     let [rows, columns] = scan.size(order);

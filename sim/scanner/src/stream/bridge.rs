@@ -1,4 +1,4 @@
-//! Bridge: a listening port, and a thread for each connection.
+//! Running bridge: a listening port, and a thread for each connection.
 
 use std::io;
 use std::net::{Ipv4Addr, SocketAddr, TcpListener, TcpStream, UdpSocket};
@@ -39,7 +39,7 @@ impl Bridge {
             let shared = Arc::clone(&shared);
             std::thread::spawn(move || accept(&listener, &shared))
         };
-        // Where the port number is taken for datagrams, the bridge cannot be found, which is allowed.
+        // If the port number is in use for datagrams, the bridge cannot be discovered, which is allowed.
         let discovery = datagrams(address).ok().map(|socket| {
             let shared = Arc::clone(&shared);
             std::thread::spawn(move || answer(&socket, &shared))
@@ -72,10 +72,11 @@ impl Drop for Bridge {
     }
 }
 
-/// Time between two looks whether the bridge ends.
+/// Interval between checks whether the bridge ends.
 const NAP: Duration = Duration::from_millis(100);
 
-/// Opens the port for discovery (section 8 of the protocol). Broadcasts reach a socket of every address alone.
+/// Opens the port for discovery (section 8 of the protocol). Broadcasts reach only a socket that is bound to all
+/// addresses.
 fn datagrams(address: SocketAddr) -> io::Result<UdpSocket> {
     let everywhere = SocketAddr::from((Ipv4Addr::UNSPECIFIED, address.port()));
     let local = address.ip().is_loopback() || address.is_ipv6();
@@ -84,7 +85,7 @@ fn datagrams(address: SocketAddr) -> io::Result<UdpSocket> {
     Ok(socket)
 }
 
-/// Answers to those who look for bridges.
+/// Answers discovery requests.
 fn answer(socket: &UdpSocket, shared: &Shared) {
     let mut datagram = [0; 2048];
     while !shared.is_ending() {
@@ -96,7 +97,7 @@ fn answer(socket: &UdpSocket, shared: &Shared) {
         }
         let payload = connection::capabilities(shared).to_string().into_bytes();
         let answer = Frame { kind: frame::CAPABILITIES, scan: 0, payload };
-        // Who asked may have gone.
+        // The client may have ended.
         let _ = socket.send_to(&frame::bytes(&answer, 0), from);
     }
 }

@@ -6,8 +6,8 @@ use serde::Deserialize;
 use serde::de::IntoDeserializer;
 use serde::de::value::Error as Unknown;
 
-/// Fault of link, bridge or scanner. The parameter `number` is a column, a share (one in n) or milliseconds, as defined by the
-/// kind; 1 by default.
+/// Fault of link, bridge or scanner. The parameter `number` is a column, a share (one in n) or milliseconds, as defined
+/// by the kind; 1 by default.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Fault {
     /// Kind of fault.

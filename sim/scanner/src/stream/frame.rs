@@ -1,4 +1,4 @@
-//! Frames on the wire and in recordings: section 1 of the protocol's page, written from that page alone.
+//! Frames on the wire and in recordings: section 1 of the protocol document, written from that document alone.
 
 use std::io::{ErrorKind, Read};
 
@@ -24,7 +24,7 @@ pub(super) const ERROR: u16 = 0x800A;
 pub(super) const SCAN_BEGIN: u16 = 0x8010;
 pub(super) const COLUMN: u16 = 0x8011;
 pub(super) const SCAN_END: u16 = 0x8012;
-/// Critical bit: a receiver that does not know the type must reject the frame.
+/// Critical bit: a receiver that does not support the type must reject the frame.
 pub(super) const CRITICAL: u16 = 0x8000;
 
 /// Frame.

@@ -1,4 +1,4 @@
-//! JSON messages of the protocol, sections 2 to 7 of its page.
+//! JSON messages of the protocol, sections 2 to 7 of its document.
 
 use serde::{Deserialize, Serialize};
 

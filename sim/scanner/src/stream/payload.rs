@@ -1,4 +1,4 @@
-//! Binary payload of a Column frame, section 5 of the protocol's page.
+//! Binary payload of a Column frame, section 5 of the protocol document.
 
 use crate::column::{SimColumn, SimState};
 

@@ -32,8 +32,8 @@ pub struct RayCastHead {
     pub plate: PlateSource,
     /// Surroundings of the plate.
     pub surroundings: Surroundings,
-    /// Error model of the scanner. Its `range_sigma` is replaced by `noise`, or by the device's where `noise` is `None`; its
-    /// seed is that of the first scan; its faces follow from the window.
+    /// Error model of the scanner. Its `range_sigma` is replaced by `noise`, or by the device's where `noise` is
+    /// `None`; its seed is that of the first scan; its faces follow from the window.
     pub instrument: Instrument,
     /// Standard deviation of a range at 10 m, metres; `None`: that of the device at its rate and compression.
     pub noise: Option<f64>,

@@ -154,8 +154,8 @@ impl Shared {
         Duration::from_millis(ms.into()).checked_sub(self.begun.elapsed())
     }
 
-    /// Grants the lease to a client, or refuses it with the holder's name. The same client takes it over: its previous connection is
-    /// closed.
+    /// Grants the lease to a client, or refuses it with the holder's name. The same client takes it over: its previous
+    /// connection is closed.
     pub(super) fn lease(&self, client: &str, connection: u32) -> Result<(), Refusal> {
         if let Some(left) = self.remaining_at_start(FaultKind::LeaseStuck) {
             return Err(busy("press-4", left));
