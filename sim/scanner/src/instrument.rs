@@ -102,7 +102,7 @@ impl Instrument {
 }
 
 /// Returns the diffuse reflectivity at 905 nm to 1550 nm; typical values: mill scale is dark, painted walls are bright.
-/// That of the plate's faces is the scene's.
+/// The reflectivity of the plate's faces is a property of the scene.
 pub(crate) fn reflectivity(label: Label, plate: f64) -> f64 {
     match label {
         Label::Nothing => 0.0,
