@@ -1,5 +1,5 @@
-//! Writes scattered points of a rolled plate with the spline fitted to them to a folder, one JSON file for each case, for
-//! `tests/peers/surface.py`.
+//! Example program for `tests/peers/surface.py`: writes scattered points of a rolled plate, with the spline fitted to
+//! them, to a folder, one JSON file for each case.
 //!
 //! ```text
 //! cargo run --release -p platen-tests --example surface_fits -- DIR
@@ -15,7 +15,7 @@ use platen_shape::surface::{SplineFit, UniformKnots};
 const SIZE: [f64; 2] = [4.0, 3.0];
 /// Radius of the plate, metres.
 const RADIUS: f64 = 12.0;
-/// Places along each side at which fits are compared, from edge to edge.
+/// Number of points along each side at which fits are compared, from edge to edge.
 const PLACES: usize = 41;
 const REPEAT: usize = 5;
 
@@ -29,7 +29,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// The rolled plate: bent along u.
+/// Returns a point of the rolled plate, which is bent along u.
 fn plate([u, v]: [f64; 2]) -> [f64; 3] {
     let angle = (u - 0.5 * SIZE[0]) / RADIUS;
     [RADIUS * angle.sin(), v, RADIUS * (1.0 - angle.cos())]

@@ -7,18 +7,18 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
 
-/// The repository.
+/// Returns the folder of the repository.
 pub fn repository() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..").canonicalize().unwrap_or_else(|_| "..".into())
 }
 
-/// Address at which nobody listens, over TCP or UDP. It is not 127.0.0.1, where a port that was given back may belong to the server of
-/// another test a moment later.
+/// Returns an address at which no program listens, over TCP or UDP. It is not 127.0.0.1, where a released port may
+/// belong to the server of another test a moment later.
 pub fn unserved_address() -> std::io::Result<SocketAddr> {
     TcpListener::bind("127.0.0.77:0")?.local_addr()
 }
 
-/// Folder of the programs and plugin libraries of this build, all of them fresh.
+/// Returns the folder of the programs and plugin libraries of this build, all of them up to date.
 ///
 /// `cargo test` builds no cdylib and no program of other members, so the first caller builds the workspace in
 /// the profile of the running test.
@@ -29,8 +29,8 @@ pub fn built() -> &'static Path {
         let folder = test.ancestors().nth(2).unwrap_or(Path::new("")).to_path_buf();
         let profile = if folder.ends_with("debug") { "dev" } else { "release" };
         let mut cargo = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
-        // What the outer cargo says of this package is not the workspace's: ring's build script would run again
-        // because of it, and all that stands on TLS would be compiled twice.
+        // Variables that the outer cargo sets for this package do not apply to the workspace: they would make ring's
+        // build script run again, and everything that depends on TLS would be compiled twice.
         for (name, _) in std::env::vars_os() {
             if name
                 .to_str()
@@ -48,14 +48,14 @@ pub fn built() -> &'static Path {
     })
 }
 
-/// A program of this build, with a clean log setting.
+/// Returns a program of this build, with an empty log setting.
 pub fn program(name: &str) -> Command {
     let mut command = Command::new(built().join(name));
     command.env_remove("PLATEN_LOG").current_dir(repository());
     command
 }
 
-/// A plugin library of this build.
+/// Returns a plugin library of this build.
 pub fn library(name: &str) -> PathBuf {
     let file =
         format!("{}{}{}", std::env::consts::DLL_PREFIX, name.replace('-', "_"), std::env::consts::DLL_SUFFIX);
@@ -77,20 +77,21 @@ pub fn compile_c(source: &Path, out: &Path, arguments: &[&str]) {
     assert!(status.is_ok_and(|s| s.success()), "cc {}", source.display());
 }
 
-/// A C source of the tests.
+/// Returns a C source of the tests.
 pub fn c_source(name: &str) -> PathBuf {
     repository().join("tests/contract").join(name)
 }
 
-/// Puts a faulty plugin into `folder`, in place of the project's `name`: it hands all calls on to that one, and does `fault` in the
-/// call `place` of jobs at `stroke`, at every one for 0 (`tests/contract/faulty.c`). In the place `word`, `fault` spoils what it emits.
+/// Puts a faulty plugin into `folder` in place of the project's `name`. It forwards all calls to the original, and does
+/// `fault` in the call `place` of jobs at `stroke`, or of every job for 0 (`tests/contract/faulty.c`). At the place
+/// `word`, `fault` damages the emitted output.
 pub fn faulty(folder: &Path, name: &str, place: &str, fault: &str, stroke: u32) {
     let (fault, spoil) = if place == "word" { ("none", fault) } else { (fault, "as_it_is") };
     let (place, fault, described) =
         if place == "desc" { ("word", "none", fault) } else { (place, fault, "as_described") };
     let target = library(name);
     assert!(std::fs::create_dir_all(folder).is_ok());
-    // Beside its final place, then renamed: a host may be loading it.
+    // Written beside its final place, then renamed: a host may be loading it.
     let new = folder.join("new.so");
     let defines = [
         format!("-DTARGET=\"{}\"", target.display()),

@@ -1,4 +1,4 @@
-//! Scans of other writers: the small set in `tests/data`, always there, and the large one where it is present.
+//! Sample scans of other writers: the small set in `tests/data`, always present, and the large one if it is present.
 //!
 //! Both have the same layout: `plates/NAME/{scan.e57 or scan.ptx.gz, job.json, truth.json}`, `lattice/*`, `e57/*`. The
 //! plates of the small set are stored as ranges (`tests/data/README.md`) and unpacked once per build.
@@ -15,15 +15,15 @@ use serde_json::Value as Json;
 
 use crate::repository;
 
-/// Files of the large set that the small one does not have: one for its licence, one for its size.
+/// Files of the large set that are not in the small one: one for its licence, one for its size.
 const LARGE_ONLY: [&str; 2] = ["lattice/amapvox_scan_test.ptx", "e57/unorganised_bunnyInt32.e57"];
 
-/// The folders of samples: the small set, then the large one from `PLATEN_SAMPLES`, else `../shared/samples`.
+/// Returns the folders of samples: the small set, then the large one from `PLATEN_SAMPLES`, else `../shared/samples`.
 ///
 /// The large set may be missing unless `PLATEN_SAMPLES` or `PLATEN_SAMPLES_REQUIRED` is set.
 ///
 /// # Panics
-/// When the small set cannot be unpacked, or the large one is required and missing.
+/// If the small set cannot be unpacked, or the large one is required and missing.
 pub fn sets() -> Vec<PathBuf> {
     let named = std::env::var_os("PLATEN_SAMPLES");
     let required = named.is_some() || std::env::var_os("PLATEN_SAMPLES_REQUIRED").is_some();
@@ -36,10 +36,10 @@ pub fn sets() -> Vec<PathBuf> {
     sets
 }
 
-/// One file or folder of each set.
+/// Returns one file or folder of each set.
 ///
 /// # Panics
-/// When a set does not have it.
+/// If a set does not have it.
 pub fn each(name: &str) -> Vec<PathBuf> {
     let mut sets = sets();
     if LARGE_ONLY.contains(&name) {
@@ -50,10 +50,10 @@ pub fn each(name: &str) -> Vec<PathBuf> {
     found
 }
 
-/// The sample plates of every set, in order.
+/// Returns the sample plates of every set, in order.
 ///
 /// # Panics
-/// When a set has none.
+/// If a set has none.
 pub fn plates() -> Vec<PathBuf> {
     let list = |set: PathBuf| {
         let entries = std::fs::read_dir(set.join("plates")).into_iter().flatten().flatten();
@@ -65,10 +65,10 @@ pub fn plates() -> Vec<PathBuf> {
     sets().into_iter().flat_map(list).collect()
 }
 
-/// A file as it is, or unpacked into `folder` where it is packed.
+/// Returns a file unchanged, or unpacked into `folder` if it is packed.
 ///
 /// # Panics
-/// When it cannot be read.
+/// If it cannot be read.
 pub fn unpacked(file: &Path, folder: &Path) -> PathBuf {
     if file.extension().is_none_or(|extension| extension != "gz") {
         return file.to_owned();
@@ -78,7 +78,7 @@ pub fn unpacked(file: &Path, folder: &Path) -> PathBuf {
     target
 }
 
-/// The scan of a sample plate, unpacked into `folder` where it is packed.
+/// Returns the scan of a sample plate, unpacked into `folder` if it is packed.
 pub fn scan(plate: &Path, folder: &Path) -> PathBuf {
     let e57 = plate.join("scan.e57");
     if e57.exists() { e57 } else { unpacked(&plate.join("scan.ptx.gz"), folder) }
@@ -93,7 +93,7 @@ fn unzip(file: &Path) -> Vec<u8> {
     read().unwrap_or_else(|e| panic!("{}: {e}", file.display()))
 }
 
-/// The small set, unpacked beside the programs of this build under a name that follows its content.
+/// Returns the small set, unpacked beside the programs of this build under a name that depends on its content.
 fn small() -> PathBuf {
     static FOLDER: OnceLock<PathBuf> = OnceLock::new();
     let unpack = || {
@@ -112,7 +112,7 @@ fn small() -> PathBuf {
         if target.is_dir() {
             return Ok(target);
         }
-        // Test programs may unpack at the same time: each has its own folder, the first rename counts.
+        // Test programs may unpack at the same time: each has its own folder, and the first rename wins.
         let own = build.join(format!("samples-{digest:016x}.{}", std::process::id()));
         for file in files {
             let place = own.join(file.strip_prefix(&data).unwrap_or(&file));

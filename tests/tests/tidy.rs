@@ -1,4 +1,4 @@
-//! Rules of the repository: the direction of dependencies, manifests, links of pages, heads of modules.
+//! Repository rules: the direction of dependencies, manifests, links of pages, heads of modules.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "tests fail by panicking")]
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -65,7 +65,7 @@ fn allowed(name: &str, folder: &str) -> Option<&'static [&'static str]> {
             "platen-report",
             "platen-scan",
             "platen-shape",
-            // The hidden steel of the advice's study.
+            // Steel model for the study of the advice.
             "platen-sim-plate",
         ],
         (_, "simulated") => &["platen-sdk", "platen-scan", "platen-sim-plate", "platen-sim-scanner"],
@@ -87,7 +87,7 @@ fn metadata() -> serde_json::Value {
     serde_json::from_slice(&output.stdout).unwrap()
 }
 
-/// Name of the folder that holds the crate's folder, or `tests`.
+/// Returns the name of the folder that contains the crate's folder, or `tests`.
 fn folder(package: &serde_json::Value) -> String {
     let manifest = std::path::Path::new(package["manifest_path"].as_str().unwrap());
     let place = manifest.strip_prefix(platen_tests::repository()).unwrap();
@@ -147,7 +147,7 @@ fn every_crate_takes_the_lints_and_the_licence_of_the_workspace() {
     }
 }
 
-/// Files of the repository whose names end so, without what git ignores.
+/// Returns the files of the repository with this ending, without those that git ignores.
 fn files(ending: &str) -> Vec<PathBuf> {
     let root = platen_tests::repository();
     let (mut found, mut folders) = (Vec::new(), vec![root.clone()]);
@@ -157,7 +157,7 @@ fn files(ending: &str) -> Vec<PathBuf> {
             if !path.is_dir() {
                 found.extend(name.ends_with(ending).then_some(path));
             } else if !name.starts_with('.') && !["target", "corpus", "artifacts"].contains(&&*name) {
-                // Folders of results beside the sources, as of `platen demo`.
+                // Folders of results beside the sources, for example of `platen demo`.
                 folders.extend((!path.join("history.sqlite").exists()).then_some(path));
             }
         }
@@ -166,13 +166,14 @@ fn files(ending: &str) -> Vec<PathBuf> {
     found
 }
 
-/// Text of a page outside its blocks of code.
+/// Returns the text of a page outside its blocks of code.
 fn prose(page: &Path) -> String {
     let text = std::fs::read_to_string(page).unwrap();
     text.split("```").step_by(2).collect()
 }
 
-/// Anchors of a page's headings as GitHub makes them: lower case, spaces as `-`, no punctuation; a repeated one is numbered.
+/// Returns the anchors of a page's headings as GitHub makes them: lower case, spaces as `-`, no punctuation; a repeated
+/// one is numbered.
 fn anchors(page: &Path) -> BTreeSet<String> {
     let mut seen: BTreeMap<String, usize> = BTreeMap::new();
     let text = prose(page);

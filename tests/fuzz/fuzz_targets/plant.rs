@@ -1,4 +1,4 @@
-//! A plant file: any text gives a plant or faults with their places.
+//! Fuzz target of the plant file: any text gives a plant or faults with their places.
 #![no_main]
 
 libfuzzer_sys::fuzz_target!(|data: &[u8]| {

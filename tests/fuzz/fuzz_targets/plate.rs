@@ -1,4 +1,4 @@
-//! A plate file: any text gives a plate or faults with their places.
+//! Fuzz target of the plate file: any text gives a plate or faults with their places.
 #![no_main]
 
 libfuzzer_sys::fuzz_target!(|data: &[u8]| {

@@ -1,4 +1,4 @@
-//! The stream's wire: any bytes in any pieces give frames, messages and columns, or an error.
+//! Fuzz target of the scan bridge protocol: any bytes in any pieces give frames, messages and columns, or an error.
 #![no_main]
 
 #[path = "../../../drivers/faro-stream/src/column.rs"]
@@ -18,7 +18,7 @@ use column::Layout;
 use message::{Capabilities, Configured, Refusal, ScanBegin, ScanEnd, Status};
 use wire::{Decoder, encode};
 
-/// Bytes of a connection, in pieces of the size that the first one says.
+/// Decodes the bytes of a connection in pieces; the first byte determines their size.
 fn raw(data: &[u8]) {
     let [size, bytes @ ..] = data else { return };
     let mut decoder = Decoder::default();
@@ -34,7 +34,7 @@ fn raw(data: &[u8]) {
     }
 }
 
-/// Payloads framed here come out as they went in, in whatever pieces.
+/// Checks that payloads framed here are decoded unchanged, in pieces of any size.
 fn framed(data: &[u8]) {
     let [size, bytes @ ..] = data else { return };
     let payloads: Vec<&[u8]> = bytes.split(|byte| *byte == 0).collect();
@@ -50,7 +50,7 @@ fn framed(data: &[u8]) {
     assert_eq!(came, payloads.len());
 }
 
-/// Messages: the text of each kind, and a lattice of what may be one.
+/// Parses messages: the text as each kind, and the columns of a lattice if the text contains a valid one.
 fn messages(data: &[u8]) {
     let _ = serde_json::from_slice::<Capabilities>(data);
     let _ = serde_json::from_slice::<Configured>(data);
@@ -66,7 +66,7 @@ fn messages(data: &[u8]) {
 fn columns(layout: &Layout, payload: &[u8]) {
     if let Ok((number, column)) = layout.column(payload) {
         assert!(number < layout.begin().columns && column.index < layout.begin().columns);
-        // A range beyond any scanner's is the host's to refuse; lengths and rows must fit.
+        // A range beyond that of any scanner is refused by the host; lengths and rows must fit.
         let n = column.len();
         assert!(column.first_row as usize + n <= layout.begin().rows as usize);
         assert!([column.azimuth.len(), column.elevation.len(), column.intensity.len(), column.state.len()] == [n; 4]);

@@ -1,4 +1,4 @@
-//! The press's registers: any words in any map give an image, or are torn.
+//! Fuzz target of the press's registers: any words in any map give an image, or a torn read.
 #![no_main]
 
 use platen_plant::PlantFile;

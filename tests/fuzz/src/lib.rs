@@ -1,7 +1,7 @@
 //! Common parts of the fuzz targets: scans of the file formats, and a limit on memory.
 //!
-//! Every run may allocate as much as the longest lattice lines need and a fixed amount per byte of input; an allocation
-//! beyond that ends the process, which the fuzzer reports with the input.
+//! Every run may allocate the memory that the longest lattice lines need, and a fixed amount for each byte of input. A
+//! larger allocation ends the process, which the fuzzer reports with the input.
 
 use std::alloc::System;
 use std::io::Cursor;
@@ -15,10 +15,10 @@ static MEMORY: Cap<System> = Cap::new(System, usize::MAX);
 
 /// Sums for 131,072 rows and as many columns, and buffers for reading.
 const LINES: usize = 64 << 20;
-/// Memory that a byte of input justifies: a cell of a text file takes 8 of them.
+/// Memory allowed for a byte of input: a cell of a text file takes 8 bytes.
 const PER_BYTE: usize = 64;
 
-/// Runs `work` with the memory that an input of `length` bytes justifies.
+/// Runs `work` with the memory allowed for an input of `length` bytes.
 pub fn within(length: usize, work: impl FnOnce()) {
     let limit = MEMORY.allocated() + LINES + PER_BYTE * length;
     MEMORY.set_limit(limit).expect("more is allocated already");
@@ -26,7 +26,7 @@ pub fn within(length: usize, work: impl FnOnce()) {
     MEMORY.set_limit(usize::MAX).expect("the limit can be lifted");
 }
 
-/// Any bytes give a lattice, with sound columns of which each comes once, or an error in one line.
+/// Checks that any bytes give a lattice with valid columns, each once, or an error in one line.
 fn scan(data: &[u8], format: Format) {
     within(data.len(), || {
         if let Err(error) = ScanReader::new(Cursor::new(data), format, None).and_then(check) {
@@ -51,7 +51,7 @@ fn check(mut reader: ScanReader<'_>) -> Result<(), ReadError> {
     Ok(())
 }
 
-/// E57 whose checksums and length are right, so that the damage reaches the parser.
+/// Runs E57 with corrected checksums and length, so that the damage reaches the parser.
 pub fn e57(data: &[u8]) {
     let mut file = data.to_vec();
     file.truncate(file.len() / 1024 * 1024);
@@ -67,17 +67,17 @@ pub fn e57(data: &[u8]) {
     scan(&file, Format::E57);
 }
 
-/// PTX.
+/// Runs PTX.
 pub fn ptx(data: &[u8]) {
     scan(data, Format::Ptx);
 }
 
-/// XYZ with row and column.
+/// Runs XYZ with row and column.
 pub fn xyz(data: &[u8]) {
     scan(data, Format::Xyz);
 }
 
-/// XYB.
+/// Runs XYB.
 pub fn xyb(data: &[u8]) {
     scan(data, Format::Xyb);
 }

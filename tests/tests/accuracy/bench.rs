@@ -1,4 +1,4 @@
-//! `platen bench`: the tables of Masuda et al. beside ours, and the same figures on any number of threads.
+//! Tests of `platen bench`: the tables of Masuda et al. beside ours, and equal figures for any number of threads.
 
 use serde_json::Value as Json;
 
@@ -26,7 +26,7 @@ fn the_papers_tables_stand_beside_our_figures() {
     assert!(found.pointer("/machine/processor").is_some_and(Json::is_string));
     assert_eq!(found.pointer("/tables/table_1/paper/plate_points"), Some(&Json::from(277_721)));
     let points = number(&found, "/tables/table_1/here/plate_points");
-    // A coarser lattice: the number of points falls with the square of its step.
+    // On a coarser lattice the number of points decreases with the square of the step.
     let expected = 277_721.0 * (360.0 / 10_240.0 / 0.1_f64).powi(2);
     assert!((points / expected - 1.0).abs() < 0.05, "{points} points, {expected} expected");
     let steps = found.pointer("/tables/table_2").and_then(Json::as_array).unwrap();

@@ -1,4 +1,4 @@
-//! Plates with bevelled edges: twelve scans of two bevels, flat and rolled, in three poses.
+//! Accuracy on plates with bevelled edges: twelve scans of two bevels, flat and rolled, in three poses.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -11,7 +11,7 @@ const MARKERS: [[f64; 2]; 5] =
 /// Inset of the face and height of the root face: double V of 30 degrees, of 25 degrees with a root face; millimetres.
 const BEVELS: [[f64; 2]; 2] = [[10.4, 0.0], [7.5, 4.0]];
 const SHAPES: [&str; 2] = ["shape = \"flat\"", "shape = \"cylinder\"\nradius_mm = 7000.0\naxis_deg = 90.0"];
-/// Edges nearly along the lattice, oblique to it, and far enough away that a flank is one or two samples wide.
+/// Edges nearly along the lattice, oblique to it, and so far away that a flank is one or two samples wide.
 const POSES: [([f64; 3], f64); 3] =
     [([6000.0, 0.0, -3600.0], 8.0), ([6500.0, 300.0, -3600.0], 35.0), ([7500.0, -400.0, -4000.0], -62.0)];
 
@@ -19,7 +19,8 @@ const POSES: [([f64; 3], f64); 3] =
 const CORNER_MM: f64 = 1.0;
 const MARKER_MM: f64 = 0.5;
 
-/// Scans and measures one plate of 3000 x 2500 x 36 mm. Returns the largest errors of a corner and of a marker, millimetres.
+/// Scans and measures one plate of 3000 x 2500 x 36 mm. Returns the largest errors of a corner and of a marker,
+/// millimetres.
 fn errors(
     folder: &Path,
     [inset, root]: [f64; 2],
@@ -62,7 +63,7 @@ fn errors(
     let output = measure.output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let result: Json = serde_json::from_slice(&output.stdout).unwrap();
-    // Its edges are shorter than the plate by the insets: that is no doubt.
+    // Its edges are shorter than the plate by the insets, which is not a doubt.
     assert_eq!(result["corners_seen"], serde_json::json!([true, true, true, true]), "{}", result["says"]);
     let truth: Json = serde_json::from_slice(&std::fs::read(path("json")).unwrap()).unwrap();
     let apart = |pointer: &str| {

@@ -1,4 +1,4 @@
-//! A blank that was cut off its rectangle: the plate bent of it, with and without a scan of the blank.
+//! Accuracy on a blank that was not cut to its rectangle: the bent plate, with and without a scan of the blank.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -8,8 +8,9 @@ use platen_shape::{Blank, DiskMesh, DiskParts};
 use platen_sim_plate::{Plate, PlateState, Shape};
 use serde_json::Value as Json;
 
-/// 4 mm too long, 3 mm too narrow, its diagonals 5 mm apart, the edge u = W bowed by 2 mm. The corners are off those of the rectangle with no
-/// mean shift and no turn, so that (u, v) of the simulator are those that a baseline gives.
+/// 4 mm too long, 3 mm too narrow, diagonals that differ by 5 mm, the edge u = W bowed by 2 mm. The offsets of the
+/// corners from the rectangle have no mean shift and no rotation, so that (u, v) of the simulator equal those of a
+/// baseline.
 const CUT: &str = "corners_off_mm = [[-3.0, 0.75], [1.0, 2.25], [3.0, -0.75], [-1.0, -2.25]]\nbows_mm = [0.0, 2.0, 0.0, 0.0]\n";
 const MARKERS: [[f64; 2]; 5] =
     [[2000.0, 1500.0], [400.0, 300.0], [3600.0, 300.0], [3600.0, 2700.0], [400.0, 2700.0]];
@@ -60,7 +61,7 @@ fn measure(folder: &Path, name: &str, flattening: &str, baseline: Option<&str>) 
     program.output().unwrap()
 }
 
-/// Distances of corners (rms) and markers (mean) from the truth, millimetres; and the outline in use.
+/// Returns the distances of corners (rms) and markers (mean) from the truth, millimetres, and the outline in use.
 fn errors(folder: &Path, name: &str, flattening: &str, baseline: Option<&str>) -> (f64, f64, Json) {
     let output = measure(folder, name, flattening, baseline);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
@@ -91,8 +92,8 @@ fn a_baseline_makes_uv_metric_on_a_blank_cut_off_its_rectangle() {
     scan(folder, "flat", CUT, FLAT, "0.05");
     scan(folder, "rolled", CUT, ROLLED, "0.05");
     scan(folder, "sphere", CUT, SPHERE, "0.05");
-    // Largest error of corners and of markers, about twice what is found: corners 0.19, 0.23, 0.33, 0.28; markers 0.11, 0.14, 0.12 and,
-    // by the harmonic map's own error on a sphere, 0.45.
+    // Largest error of corners and of markers, about twice the found values: corners 0.19, 0.23, 0.33, 0.28; markers
+    // 0.11, 0.14, 0.12 and, due to the harmonic map's own error on a sphere, 0.45.
     for (name, flattening, bounds) in [
         ("rolled", "elastic", [0.4, 0.21]),
         ("rolled", "harmonic", [0.46, 0.25]),
@@ -120,10 +121,10 @@ fn a_baseline_that_tells_no_outline_says_why_in_one_sentence() {
     let folder = folder.path();
     scan(folder, "flat", "", FLAT, "0.1");
     scan(folder, "sphere", "", SPHERE, "0.1");
-    // Less than a hundredth too wide, which would be refused before.
+    // Less than a hundredth too wide, which would have been refused before.
     let far = "corners_off_mm = [[-18.0, -12.0], [18.0, -12.0], [18.0, 12.0], [-18.0, 12.0]]\n";
     scan(folder, "other", far, FLAT, "0.1");
-    // One that was pressed already goes on with the rectangle, another plate is refused.
+    // For a blank that was pressed already the rectangle is kept; another plate is refused.
     for (baseline, code, says) in [
         ("sphere", 0, "baseline: the blank is curved in two directions"),
         ("other", 1, "off its rectangle as ordered, 20 mm at most; check width_mm"),
@@ -140,7 +141,7 @@ fn a_baseline_that_tells_no_outline_says_why_in_one_sentence() {
     }
 }
 
-/// The simulator's plate of 4000 x 3000 mm as a mesh without error, `n` cells each way.
+/// Returns the simulator's plate of 4000 x 3000 mm as a mesh without error, `n` cells in each direction.
 fn mesh(shape: Shape, n: u32) -> DiskMesh {
     let plate = Plate::new(&PlateState { shape, ..PlateState::flat(4000.0, 3000.0, 36.0) }).unwrap();
     let at = |i: u32, j: u32| [4.0 * f64::from(i) / f64::from(n), 3.0 * f64::from(j) / f64::from(n)];
@@ -173,10 +174,11 @@ fn mesh(shape: Shape, n: u32) -> DiskMesh {
     .unwrap()
 }
 
-/// The simulator lays the flat sheet on the shape with its own series of least energy; here the way leads back.
+/// The simulator lays the flat sheet on the shape with its own series of least energy; the test recovers the outline
+/// from it.
 #[test]
 fn a_blank_a_little_curved_tells_its_outline() {
-    // Twice what is found: 1e-4 mm, and 0.012 mm on the cylinder, whose facets are chords.
+    // Twice the found values: 1e-4 mm, and 0.012 mm on the cylinder, whose facets are chords.
     for (shape, bound_mm) in [
         (Shape::Sphere { radius_mm: 80_000.0 }, 3e-4),
         (Shape::Torus { axis_deg: 30.0, radius_mm: 60_000.0, cross_radius_mm: -150_000.0 }, 3e-4),

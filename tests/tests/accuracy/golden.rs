@@ -1,16 +1,16 @@
-//! Figures of the small set's plates against those of the last review, `tests/golden/figures.json`.
+//! Golden test of the small set's figures against those of the last review, `tests/golden/figures.json`.
 //!
-//! `PLATEN_BLESS=1 cargo test --release -p platen-tests --test accuracy golden` writes the file anew; read the change before it is
-//! committed. A result is the same to the last bit on one model of processor; between models vector widths differ, hence the
-//! tolerance.
+//! `PLATEN_BLESS=1 cargo test --release -p platen-tests --test accuracy golden` writes the file again; review the
+//! change before it is committed. A result is the same to the last bit on one model of processor. Vector widths differ
+//! between models, hence the tolerance.
 
 use platen_tests::samples;
 use serde_json::{Value as Json, json};
 
 use crate::plates::measure;
 
-/// Largest difference: metres of places and radians, millimetres of figures that are in millimetres. Half of it is the rounding
-/// of the file's seven decimals.
+/// Largest difference: metres for positions, radians, millimetres for figures in millimetres. Half of it is the
+/// rounding of the file to seven decimals.
 const TOLERANCE: f64 = 1e-7;
 
 fn figures(result: &Json) -> Json {
@@ -26,7 +26,7 @@ fn figures(result: &Json) -> Json {
     })
 }
 
-/// Rounds every number to seven decimals, so that a change of a last bit is no change of the file.
+/// Rounds every number to seven decimals, so that a change of a last bit does not change the file.
 fn round(figures: &mut Json) {
     match figures {
         Json::Object(entries) => entries.values_mut().for_each(round),
@@ -38,7 +38,7 @@ fn round(figures: &mut Json) {
     }
 }
 
-/// Returns one line a figure, which a person can read and compare.
+/// Returns one line for each figure, which a person can read and compare.
 fn lines(plates: &Json) -> String {
     let line = |(name, figure): (&String, &Json)| match figure.as_array() {
         Some(values) => {

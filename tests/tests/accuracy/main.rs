@@ -1,4 +1,4 @@
-//! Figures of `platen measure` and `platen bench` against known truth.
+//! Accuracy of `platen measure` and `platen bench` against known truth.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "tests fail by panicking")]
 
 mod bench;

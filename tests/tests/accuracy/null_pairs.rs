@@ -1,11 +1,14 @@
-//! Null pairs of the driver `simulated`: scans of one plate that was moved by up to 0.3 m and never bent, by a scanner with and without a
-//! cyclic range error, of a class that the driver states, and calibrated on some scans and judged on others.
+//! Null pairs of the driver `simulated`: scans of one plate that was moved by up to 0.3 m and never bent.
+//!
+//! The scanner has a cyclic range error or none, is of a class that the driver states, and is calibrated on some scans
+//! and judged on others.
 
 use std::path::{Path, PathBuf};
 
 use serde_json::Value as Json;
 
-/// A cone, which looks the same from no side, and a template as wide as the stated range error can judge, or not.
+/// A cone, which looks different from every side, and a template that can, or cannot, be judged with the stated range
+/// error.
 const PLATE: &str = r#"[plate]
 id = "P"
 width_mm = 3000.0
@@ -26,7 +29,7 @@ chord_mm = 1500.0
 limit_mm = 0.75
 "#;
 
-/// Scans to calibrate on, and others to judge.
+/// Number of scans for the calibration, and of others to judge.
 const SCANS: u32 = 8;
 /// Amplitude of the cyclic range error, millimetres.
 const CYCLIC_MM: f64 = 0.4;
@@ -49,7 +52,7 @@ impl Plant {
         self.path(name)
     }
 
-    /// Scans the cone of these radii at the `seed`-th place of a Halton sequence.
+    /// Scans the cone with these radii at the `seed`-th position of a Halton sequence.
     fn scan(&self, seed: u32, cyclic_mm: f64, [start_mm, end_mm]: [f64; 2]) -> PathBuf {
         let [x, y, z, yaw] = [2, 3, 5, 7].map(|base| 2.0 * halton(seed, base) - 1.0);
         let centre = [6000.0 + 300.0 * x, 300.0 * y, -3600.0 + 30.0 * z];
@@ -70,7 +73,7 @@ impl Plant {
         scan
     }
 
-    /// A plant file for measuring with the rest of its text.
+    /// Writes a plant file for measuring, with the rest of its text.
     fn plant(&self, name: &str, rest: &str) -> PathBuf {
         let text = "[frame]\nu_axis = [1.0, 0.0, 0.0]\n[flattening]\nplugin = \"harmonic\"\n";
         self.write(name, &format!("{text}{rest}"))
@@ -107,14 +110,14 @@ impl Plant {
         found["sigma_correlated_mm"].as_f64().unwrap()
     }
 
-    /// Share of the plate above the level of detection, in the mean over pairs.
+    /// Returns the share of the plate above the level of detection, as the mean over pairs.
     fn above(&self, plant: &Path, pairs: &[[&PathBuf; 2]]) -> f64 {
         let share = |[now, before]: &[&PathBuf; 2]| figure(&self.measure(plant, now, before).0);
         pairs.iter().map(share).sum::<f64>() / pairs.len() as f64
     }
 }
 
-/// The `index`-th number of the van der Corput sequence in a base: even coverage of 0 to 1.
+/// Returns the `index`-th number of the van der Corput sequence in a base: even coverage of 0 to 1.
 fn halton(mut index: u32, base: u32) -> f64 {
     let (mut share, mut number) = (1.0, 0.0);
     while index > 0 {
@@ -125,7 +128,7 @@ fn halton(mut index: u32, base: u32) -> f64 {
     number
 }
 
-/// Share of the plate above the level of detection.
+/// Returns the share of the plate above the level of detection.
 fn figure(result: &Json) -> f64 {
     let figures =
         result["comparisons"].as_array().unwrap().iter().filter_map(|c| c["figures"].as_array()).flatten();
@@ -137,7 +140,7 @@ fn pairs(scans: &[PathBuf]) -> Vec<[&PathBuf; 2]> {
     (0..scans.len()).flat_map(|k| scans[..k].iter().map(move |before| [&scans[k], before])).collect()
 }
 
-/// Unchanged plates: seeds 1 to 8 calibrate, 9 to 16 are judged.
+/// Unchanged plates: seeds 1 to 8 are for calibration, 9 to 16 are judged.
 #[test]
 fn an_unchanged_plate_shows_its_nominal_share_once_calibrated() {
     // Found: 0.053 and 0.050 of the area.
@@ -172,7 +175,8 @@ fn until_a_calibration_the_range_error_of_the_class_stands_in() {
     assert!(stated < 0.18 && ignored > 0.5, "{stated} {ignored}");
 
     let template = |result: &Json| result["reference_lines"][0]["templates"][0].clone();
-    // The driver states its cyclic error: 0.4 mm / sqrt 2. The gap is nearer to its limit than that error allows to say.
+    // The driver states its cyclic error: 0.4 mm / sqrt 2. The gap is closer to its limit than this error permits to
+    // decide.
     let (result, log) = plant.measure(&class, &scans[0], &scans[1]);
     let sentence = "the scanner is not calibrated: a range error of 0.28 mm (one sigma) is assumed, as its driver states it; \
                     places and lengths are stated without it";

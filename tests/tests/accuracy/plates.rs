@@ -1,4 +1,4 @@
-//! `platen measure` on plates with known truth, made by an independent generator.
+//! Accuracy of `platen measure` on plates with known truth, made by an independent generator.
 
 use std::io::Write as _;
 use std::path::Path;
@@ -19,8 +19,9 @@ struct Bounds {
     near_edge: f64,
 }
 
-/// About twice the largest figure found, in the small set or the large one, with either flattening: a scan is one draw of noise
-/// and of where the lattice falls on the edges, which moves corners and markers by half of what is found.
+/// About twice the largest figure found, in the small set or the large one, with either flattening. A scan is one
+/// random draw of noise and of the position of the lattice on the edges; this moves corners and markers by half of the
+/// found values.
 const PLATES: [(&str, Bounds); 8] = [
     // Found: corners 0.20, markers 0.10 and 0.12, surface 0.0025 and 0.006.
     (
@@ -37,8 +38,8 @@ const PLATES: [(&str, Bounds); 8] = [
         "p3_half_bent",
         Bounds { corners: 0.6, markers: 0.42, markers_harmonic: 0.28, inside: 0.012, near_edge: 0.021 },
     ),
-    // Found on the three: corners 0.46 (one edge runs along a column of the lattice and lies anywhere between two), markers 0.11 and
-    // 0.14, surface 0.005 and 0.011.
+    // Found on the three: corners 0.46 (one edge runs along a column of the lattice and lies anywhere between two),
+    // markers 0.11 and 0.14, surface 0.005 and 0.011.
     ("p4a_stroke", BANDS),
     ("p4b_stroke", BANDS),
     ("p4c_null_pair_of_p4b", BANDS),
@@ -47,7 +48,8 @@ const PLATES: [(&str, Bounds); 8] = [
         "p5_cone_ptx",
         Bounds { corners: 0.52, markers: 0.25, markers_harmonic: 0.2, inside: 0.014, near_edge: 0.028 },
     ),
-    // Found: corners 0.28, markers 0.09 and 0.11, surface 0.005 and 0.013: range noise 0.8 instead of 0.5 mm, parts hidden.
+    // Found: corners 0.28, markers 0.09 and 0.11, surface 0.005 and 0.013: range noise 0.8 instead of 0.5 mm, parts
+    // hidden.
     (
         "p6_occluded",
         Bounds { corners: 0.57, markers: 0.19, markers_harmonic: 0.22, inside: 0.01, near_edge: 0.025 },
@@ -56,11 +58,12 @@ const PLATES: [(&str, Bounds); 8] = [
 const BANDS: Bounds =
     Bounds { corners: 0.92, markers: 0.22, markers_harmonic: 0.27, inside: 0.0106, near_edge: 0.022 };
 
-/// Largest error of a displacement vector, millimetres rms, of the stroke and of the null pair: 0.06 and 0.095 are found.
+/// Largest error of a displacement vector, millimetres rms, of the stroke and of the null pair: 0.06 and 0.095 are
+/// found.
 const STROKE_MM: f64 = 0.12;
 const NULL_PAIR_MM: f64 = 0.19;
-/// Least number of the 441 places that a stroke changes: 105 are found with the range error assumed of an unknown scanner, 147 without. A null
-/// pair changes none.
+/// Least number of the 441 points that a stroke changes: 105 are found with the range error assumed for an unknown
+/// scanner, 147 without. A null pair changes none.
 const CHANGED: usize = 74;
 
 fn load(path: &Path) -> Json {
@@ -71,7 +74,7 @@ fn vec3(json: &Json) -> Vec3 {
     Vec3::from_fn(|k, _| json[k].as_f64().unwrap())
 }
 
-/// Writes what a user would know as a plate file and gives the u-axis hint.
+/// Writes the data available to a user as a plate file and returns the u-axis hint.
 fn plate_file(plate: &Path, file: &Path) -> String {
     let job = load(&plate.join("job.json"));
     let mut toml = std::fs::File::create(file).unwrap();
@@ -95,7 +98,7 @@ fn plate_file(plate: &Path, file: &Path) -> String {
     format!("{},{},{}", hint[0], hint[1], hint[2])
 }
 
-/// Runs the program as a user would and reads its result.
+/// Runs the program like a user and reads its result.
 pub(crate) fn measure(plate: &Path, folder: &Path, flattening: &str, more: &[&str]) -> Json {
     let file = folder.join("plate.toml");
     let hint = plate_file(plate, &file);
@@ -118,7 +121,7 @@ pub(crate) fn measure(plate: &Path, folder: &Path, flattening: &str, more: &[&st
     serde_json::from_slice(&output.stdout).unwrap()
 }
 
-/// S(u, v) of the record, evaluated by de Boor's recursion: nothing of the program's own evaluation is used.
+/// Surface S(u, v) of the record, evaluated by de Boor's recursion, independent of the program's own evaluation.
 struct Spline {
     knots: [Vec<f64>; 2],
     /// v outer, u inner.
@@ -137,7 +140,7 @@ impl Spline {
 
     fn basis(knots: &[f64], i: usize, degree: usize, x: f64) -> f64 {
         if degree == 0 {
-            // The knots go on evenly beyond both ends, so the last span needs no special case.
+            // The knots continue evenly beyond both ends, so the last span needs no special case.
             return f64::from(knots[i] <= x && x < knots[i + 1]);
         }
         let part = |a: usize, b: usize| if knots[b] > knots[a] { 1.0 / (knots[b] - knots[a]) } else { 0.0 };
@@ -162,7 +165,7 @@ impl Spline {
         sum
     }
 
-    /// The scanned face above (u, v) and its normal, towards the scanner in the origin.
+    /// Returns the scanned face above (u, v) and its normal, towards the scanner in the origin.
     fn face(&self, u: f64, v: f64, thickness: f64) -> (Vec3, Vec3) {
         let h = 1e-5;
         let mid = self.point(u, v);
@@ -183,7 +186,7 @@ struct Row {
     near_edge: f64,
 }
 
-/// Errors of one result against its truth, millimetres.
+/// Returns the errors of one result against its truth, millimetres.
 fn against_truth(result: &Json, truth: &Json) -> Row {
     let mm = |found: &Json, expected: &Json| (vec3(found) - vec3(expected)).norm() * 1000.0;
     let corners: Vec<f64> = (0..4).map(|k| mm(&result["corners_m"][k], &truth["corners_m"][k])).collect();
@@ -203,7 +206,7 @@ fn against_truth(result: &Json, truth: &Json) -> Row {
     let (mut inside, mut near_edge) = (Vec::new(), Vec::new());
     for (i, &u) in us.iter().enumerate() {
         for (j, &v) in vs.iter().enumerate() {
-            // The foot of the true point on S: its own (u, v) is off by the error of the flattening.
+            // Foot of the true point on S: its own (u, v) contains the error of the flattening.
             let target = vec3(&truth["surface_grid"]["xyz_m"][i][j]);
             let (mut at_u, mut at_v) = (u, v);
             for _ in 0..3 {
@@ -269,14 +272,14 @@ fn every_plate_is_measured_within_its_bounds() {
                     failures.push(format!("{name} {flattening}: {what} {found:.4} mm, bound {bound}"));
                 }
             }
-            // Nothing is good by default: there is no target, so nothing is judged.
+            // No verdict without a target.
             assert_eq!(result["verdict"], "cannot_tell");
         }
     }
     assert!(failures.is_empty(), "{failures:#?}");
 }
 
-/// Best rigid motion that takes `from` to `to` (Kabsch), as a function.
+/// Returns the best rigid motion from `from` to `to` (Kabsch), as a function.
 fn rigid(from: &[Vec3], to: &[Vec3]) -> impl Fn(&Vec3) -> Vec3 {
     let mean = |points: &[Vec3]| points.iter().sum::<Vec3>() / points.len() as f64;
     let (a, b) = (mean(from), mean(to));
@@ -313,7 +316,7 @@ fn a_stroke_shows_as_displacement_and_a_null_pair_does_not() {
                 n_changed += usize::from(grid["unchanged"][j * 21 + i] == false);
             }
         }
-        // Displacements are known up to a rigid motion of the plate: the one that fits best is taken away.
+        // Displacements are known up to a rigid motion of the plate: the best-fitting one is removed.
         let from: Vec<Vec3> = found.iter().map(|(at, d)| at - d).collect();
         let to: Vec<Vec3> = found.iter().zip(&expected).map(|((at, _), e)| at - e).collect();
         let motion = rigid(&from, &to);

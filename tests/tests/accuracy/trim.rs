@@ -1,5 +1,7 @@
-//! From a tank to a marked plate: the trim lines of a petal on the formed plate, measured from a simulated scan of an elastic plate, against the
-//! petal itself.
+//! Accuracy of trim lines from a tank to a marked plate: the trim lines of a petal are measured on the formed plate and
+//! compared with the petal.
+//!
+//! The formed plate is a simulated scan of an elastic plate.
 
 use std::path::Path;
 
@@ -8,7 +10,7 @@ use serde_json::Value as Json;
 const RADIUS: f64 = 9.018;
 const THICKNESS: f64 = 0.036;
 const GAP: f64 = 0.003;
-/// Largest error of a mark, metres. Found: 0.2 mm; 11 mm when the blank is taken for the development along great circles.
+/// Largest error of a mark, metres. Found: 0.2 mm; 11 mm if the blank is developed along great circles.
 const OFF: f64 = 0.4e-3;
 
 #[track_caller]
@@ -19,7 +21,7 @@ fn run(arguments: &[&str], folder: &Path) -> Json {
     serde_json::from_slice(&output.stdout).unwrap()
 }
 
-/// Place on the scanned inside of the petal at the share `t` of its meridian and a side from -1 to 1.
+/// Returns a point on the scanned inside of the petal at the share `t` of its meridian and a side from -1 to 1.
 fn petal(t: f64, side: f64) -> [f64; 3] {
     let polar = (55.0 + 35.0 * t).to_radians();
     let turn = side * (std::f64::consts::PI / 24.0 - 0.5 * GAP / (RADIUS * polar.sin()));
@@ -49,7 +51,7 @@ fn trim_lines_on_a_formed_petal_are_its_outline() {
     let measure = ["measure", "scan.e57", "--plate", "plates/plate-003.toml", "--u-axis", "1,0,0"];
     let result = run(&measure, folder.path());
 
-    // Every mark with its place on the petal; distances of all pairs, so that no frame is needed.
+    // Every mark with its point on the petal; distances of all pairs, so that no frame is needed.
     let mut marks: Vec<([f64; 3], [f64; 3])> = Vec::new();
     for (line, place) in result["trim_lines"].as_array().unwrap().iter().zip([0, 1, 2, 3]) {
         let points = line["points"].as_array().unwrap();
@@ -71,7 +73,7 @@ fn trim_lines_on_a_formed_petal_are_its_outline() {
     println!("largest error of a distance between two marks: {:.2} mm", 1e3 * worst);
     // Two marks and their errors.
     assert!(worst <= 2.0 * OFF, "{worst}");
-    // The tape measures that stand in the document.
+    // The tape measures in the document.
     let seam = &result["trim_lines"][1]["points"];
     let tape = 1e-3 * seam[12]["from_first_mm"].as_f64().unwrap();
     assert!((tape - distance(petal(0.0, 1.0), petal(1.0, 1.0))).abs() <= 2.0 * OFF, "{tape}");

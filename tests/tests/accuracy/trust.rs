@@ -1,12 +1,12 @@
-//! Trust in a measurement, from scan files: a plate that came back turned is refused, painted markers verify the
-//! virtual ones, a calibration is written and used.
+//! Reliability checks on scan files: a plate that was turned is refused, painted markers verify the virtual ones, and a
+//! calibration is written and used.
 
 use std::path::{Path, PathBuf};
 use std::process::Output;
 
 use serde_json::Value as Json;
 
-/// A square plate, so that a quarter turn is possible, and a cone, which looks the same from no side.
+/// A square plate, so that a quarter turn is possible, and a cone, which looks different from every side.
 const PLATE: &str = "[plate]\nid = \"P\"\nwidth_mm = 2500.0\nheight_mm = 2500.0\nthickness_mm = 36.0\n";
 const CONE: &str = r#"{ shape = "cone", radius_start_mm = 4000.0, radius_end_mm = 6000.0, axis_deg = 90.0 }"#;
 
@@ -28,7 +28,7 @@ impl Bench {
         self.file(name)
     }
 
-    /// A scan of a plate of this shape, turned by `yaw_deg`.
+    /// Scans a plate of this shape, turned by `yaw_deg`.
     fn scan(&self, name: &str, shape: &str, blank: &str, yaw_deg: f64, more: &[&str]) -> PathBuf {
         let text = format!(
             "strokes = 0\nshape = {shape}\n[blank]\nthickness_mm = 36.0\n{blank}\n[pose]\ncentre_mm = [6000.0, 0.0, -3600.0]\n\
@@ -60,7 +60,7 @@ fn text(path: &Path) -> &str {
     path.to_str().unwrap()
 }
 
-/// Failed with this exit code and one sentence that holds the words.
+/// Checks a failure with this exit code and one sentence that contains the words.
 #[track_caller]
 fn refused(output: &Output, code: i32, words: &[&str]) {
     let said = String::from_utf8_lossy(&output.stderr);
@@ -77,7 +77,7 @@ fn json(output: &Output) -> Json {
     serde_json::from_slice(&output.stdout).unwrap_or_else(|e| panic!("{e}: {said}"))
 }
 
-/// The largest displacement along the normal, millimetres.
+/// Returns the largest displacement along the normal, millimetres.
 fn largest_change_mm(result: &Json) -> f64 {
     let figures =
         result["comparisons"].as_array().unwrap().iter().flat_map(|it| it["figures"].as_array().unwrap());
@@ -108,11 +108,11 @@ fn a_plate_that_came_back_turned_is_refused() {
     }
     let askew = bench.scan("askew.e57", CONE, SQUARE, 42.0, &[]);
     refused(&measure(&askew, &["--before", text(&before)]), 1, &["askew.e57", "degrees from where u ran"]);
-    // Turned by 25 degrees it is the same plate still, and its corner goes on with it.
+    // Turned by 25 degrees it is still the same plate, and its corner is continued.
     let moved = bench.scan("moved.e57", CONE, SQUARE, 25.0, &["--scan-seed", "2"]);
     let result = json(&measure(&moved, &["--before", text(&before)]));
     assert!(largest_change_mm(&result) < 0.25, "{}", result["says"]);
-    // Another plate's scan as the one before.
+    // The scan of another plate as the previous one.
     let other = bench.scan("other.e57", CONE, "width_mm = 2500.0\nheight_mm = 2000.0", 0.0, &[]);
     refused(&measure(&before, &["--before", text(&other)]), 1, &["other.e57", "2500 mm"]);
 }
@@ -201,17 +201,17 @@ fn a_calibration_is_written_used_and_refused_when_it_is_none() {
     let found = json(&output);
     let sigma = found["sigma_true_mm"].as_f64().unwrap();
     println!("null pairs {}, artefact {}", found["pairs"], found["artefact"]);
-    // The range error repeats in every scan: null pairs do not show it, the artefact does.
+    // The range error repeats in every scan: it is visible in the artefact, but not in null pairs.
     assert!((0.05..0.5).contains(&sigma), "{found}");
     assert!(found["sigma_correlated_mm"].as_f64().unwrap() < 0.1, "{found}");
     let result = gap(&[]);
-    // The file has it to a tenth of a micrometre.
+    // The file contains it to a tenth of a micrometre.
     let used = result["calibration"]["sigma_true_mm"].as_f64().unwrap();
     assert!((used - sigma).abs() < 1e-4, "{used} {sigma}");
     let stated = result["reference_lines"][0]["templates"][0]["uncertainty_mm"].as_f64().unwrap();
     assert!(stated > 1.9 * sigma, "{stated} {sigma}");
 
-    // Two different plates are no null pair, and one scan is no pair at all.
+    // Two different plates are not a null pair, and one scan is not a pair.
     let bent = bench.scan(
         "bent.e57",
         r#"{ shape = "cylinder", radius_mm = 9000.0, axis_deg = 90.0 }"#,

@@ -1,4 +1,5 @@
-//! The plugin boundary: header against Rust types, a scanner in C, and every way in which a library can be wrong.
+//! Tests of the plugin boundary: the header against the Rust types, a scanner in C, and every way in which a library
+//! can be invalid.
 
 use std::path::Path;
 use std::process::Command;
@@ -11,7 +12,7 @@ use platen_tests::{c_source, compile_c};
 
 const LIMIT: Duration = Duration::from_secs(20);
 
-/// A library of C text in a folder of its own, found as `name`.
+/// Builds a library from C text in a folder of its own, found as `name`.
 fn c_plugin(folder: &Path, name: &str, text: &str) -> Catalogue {
     let file = folder.join("plugin.c");
     std::fs::write(&file, text).unwrap();
@@ -96,7 +97,7 @@ fn a_scanner_in_c_scans() {
     cancel.cancel();
     let stopped = scan.finish().unwrap_err();
     assert!(matches!(stopped, PluginError::Stopped { why: "it was cancelled", .. }), "{stopped}");
-    // One that is given up leaves the scanner ready for the next.
+    // After an abandoned scan the scanner is ready for the next.
     drop(scanner.start(JobSpec::untriggered(LIMIT), None).unwrap());
     assert_eq!(scanner.start(JobSpec::untriggered(LIMIT), None).unwrap().finish().unwrap().points, 4800);
     let late = scanner.start(JobSpec::untriggered(Duration::ZERO), None);
@@ -150,7 +151,7 @@ fn every_wrong_library_gets_its_own_sentence() {
     assert!(matches!(&wrong_kind, PluginError::WrongKind { needed: "scanner", .. }), "{wrong_kind}");
 }
 
-/// Built from each released header, and never again.
+/// Libraries built from each released header, and never built again.
 #[test]
 #[cfg(target_arch = "x86_64")]
 fn a_library_of_each_released_boundary_loads_for_ever() {

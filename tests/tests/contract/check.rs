@@ -1,4 +1,4 @@
-//! `platen plugins check`: our own plugins pass it, each faulty one fails the test of its fault and no other.
+//! Tests of `platen plugins check`: our own plugins pass it, each faulty one fails the test for its fault and no other.
 
 use std::path::Path;
 use std::process::Output;
@@ -10,7 +10,7 @@ fn check(library: &Path, more: &[&str]) -> Output {
     platen_tests::program("platen").args(["plugins", "check"]).arg(library).args(more).output().unwrap()
 }
 
-/// Names of the tests that failed.
+/// Returns the names of the tests that failed.
 fn failed(library: &Path, more: &[&str]) -> Vec<String> {
     let output = check(library, &[&["--json"], more].concat());
     let report: Json = serde_json::from_slice(&output.stdout)
@@ -25,11 +25,11 @@ fn failed(library: &Path, more: &[&str]) -> Vec<String> {
 #[test]
 fn our_flattenings_and_comparisons_pass() {
     for plugin in ["elastic", "harmonic", "abf", "template", "curvature", "displacement"] {
-        // The plugin with the most work takes 10 s for 30 jobs: one name of each level's tests instead.
+        // The slowest plugin takes 10 s for 30 jobs; for it one name of each level's tests is run instead.
         let level = if ["harmonic", "template"].contains(&plugin) { "3" } else { "2" };
         let output = check(&platen_tests::library(plugin), &["--level", level]);
         let text = String::from_utf8_lossy(&output.stdout);
-        // How long loading takes depends on what else the machine does.
+        // The time of loading depends on the other load of the machine.
         let warned = text.lines().any(|line| line.starts_with("warning") && !line.contains("load.quick"));
         assert!(output.status.success() && !warned, "{plugin}: {text}");
     }
@@ -43,7 +43,7 @@ fn our_drivers_pass_what_needs_no_device() {
     }
 }
 
-/// Where it is faulty, the fault, and the test that finds it.
+/// Place of the fault, the fault, and the test that finds it.
 const FAULTS: [(&str, &str, &str, &str); 36] = [
     ("harmonic", "constructor", "segv", "load.loads"),
     ("harmonic", "constructor", "leave", "load.loads"),

@@ -1,4 +1,5 @@
-//! The plugin boundary: header against Rust types, a scanner in C, every way in which a library can be wrong, and what each costs.
+//! Plugin boundary: the header against the Rust types, a scanner in C, every way in which a library can be invalid, and
+//! the cost of each.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "tests fail by panicking")]
 
 mod boundary;

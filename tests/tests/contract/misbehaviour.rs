@@ -1,4 +1,5 @@
-//! Faults of a plugin at one measurement: the program names the plugin and how it ended, prints nothing of it, and leaves no process.
+//! Faults of a plugin in one measurement: the program reports the plugin and how it ended, prints none of its output,
+//! and leaves no process.
 
 use std::path::{Path, PathBuf};
 use std::process::Output;
@@ -6,7 +7,7 @@ use std::process::Output;
 use platen_tests::faulty;
 use serde_json::Value as Json;
 
-/// A folder with a scan of a plate, its plate file, and a folder for faulty plugins.
+/// Folder with a scan of a plate, its plate file, and a folder for faulty plugins.
 pub(crate) struct Bench(tempfile::TempDir);
 
 impl Bench {
@@ -14,7 +15,7 @@ impl Bench {
         Self::rolled(90.0)
     }
 
-    /// The plate rolled to 6 m about an axis at so many degrees to its u.
+    /// Creates a plate rolled to 6 m about an axis at this angle to its u, degrees.
     pub(crate) fn rolled(axis_deg: f64) -> Self {
         let bench = Self(tempfile::tempdir().unwrap());
         std::fs::write(
@@ -47,7 +48,7 @@ impl Bench {
         self.0.path().join(name)
     }
 
-    /// Measures the scan with the plugins of this folder first.
+    /// Measures the scan; plugins of this folder are found first.
     pub(crate) fn measure(&self, plugins: &Path, more: &[&str]) -> Output {
         let mut platen = platen_tests::program("platen");
         platen
@@ -61,7 +62,7 @@ impl Bench {
         platen.output().unwrap()
     }
 
-    /// Measures with one faulty plugin; returns the output as texts.
+    /// Measures with one faulty plugin; returns the output as text.
     fn with_fault(&self, name: &str, place: &str, fault: &str) -> Measured {
         let plugins = self.file(&format!("{name}-{place}-{fault}"));
         faulty(&plugins, name, place, fault, 0);
@@ -82,7 +83,7 @@ struct Measured {
     error: String,
 }
 
-/// The processes that have a library of this folder mapped.
+/// Returns the processes that have mapped a library of this folder.
 fn left_behind(folder: &Path) -> Vec<String> {
     let maps = std::fs::read_dir("/proc").unwrap().flatten().filter_map(|process| {
         let text = std::fs::read_to_string(process.path().join("maps")).ok()?;
@@ -91,7 +92,7 @@ fn left_behind(folder: &Path) -> Vec<String> {
     maps.collect()
 }
 
-/// A fault in `run` and the words that tell it.
+/// Fault in `run`, and the words that report it.
 const ENDS: [(&str, &str); 5] = [
     ("segv", "SIGSEGV"),
     ("leave", "exit code 0"),
@@ -141,7 +142,7 @@ fn a_comparison_that_ends_leaves_the_others_in_force() {
     }
 }
 
-/// Calls that a flattening or comparison has no use for.
+/// Calls that a flattening or comparison does not need.
 const CLOSED: [&str; 4] = ["open_file", "open_socket", "shell", "fork_away"];
 
 #[test]
@@ -150,7 +151,7 @@ fn a_flattening_that_reaches_for_files_sockets_or_programs_is_ended() {
     for fault in CLOSED {
         let measured = bench.with_fault("harmonic", "run", fault);
         assert_eq!(measured.code, Some(1), "{fault}: {}", measured.error);
-        // system() blocks the signal that would name the call.
+        // system() blocks the signal whose handler would print the call.
         assert!(
             fault == "shell" || measured.error.contains("is closed to flattenings and comparisons"),
             "{fault}: {}",
@@ -166,7 +167,7 @@ fn limits_bite() {
     for plugin in ["harmonic", "faro-file"] {
         for fault in ["eat_memory", "eat_files"] {
             let measured = bench.with_fault(plugin, "run", fault);
-            // The plugin gives up when it gets no more: without a limit it would hang.
+            // The plugin stops when it receives no more; without a limit it would hang.
             let ended = if plugin == "harmonic" && fault == "eat_files" { "SIGSYS" } else { "SIGABRT" };
             assert!(measured.error.contains(ended), "{plugin} {fault}: {}", measured.error);
             assert_eq!(measured.code, Some(1));

@@ -1,6 +1,8 @@
-//! `platen plugins new`: each kind in each language builds at once, passes `platen plugins check`, and measures a plate.
+//! Tests of `platen plugins new`: each kind in each language builds without changes, passes `platen plugins check`, and
+//! measures a plate.
 //!
-//! `PLATEN_RUST=all` builds all three kinds in Rust (a minute and a half for the libraries under a comparison), else the scanner alone.
+//! `PLATEN_RUST=all` builds all three kinds in Rust (a minute and a half for the libraries that a comparison needs),
+//! otherwise only the scanner.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -9,7 +11,7 @@ use serde_json::Value as Json;
 
 use crate::misbehaviour::Bench;
 
-/// Makes and builds a plugin; returns its library.
+/// Creates and builds a plugin; returns its library.
 fn made(folder: &Path, kind: &str, language: &str) -> PathBuf {
     let name = format!("my-{kind}-{language}");
     let place = folder.join(&name);
@@ -51,7 +53,7 @@ fn languages(kind: &str) -> &'static [&'static str] {
     if all || kind == "scanner" { &["c", "cpp", "rust"] } else { &["c", "cpp"] }
 }
 
-/// Measures the bench's cylinder with a plant that names the plugin.
+/// Measures the cylinder of `bench` with a plant that uses the plugin.
 fn measured(bench: &Bench, library: &Path, plant: &str) -> Json {
     std::fs::write(bench.file("plant.toml"), format!("[plant]\nname = \"test\"\n{plant}")).unwrap();
     let output = bench.measure(library.parent().unwrap(), &[]);

@@ -1,4 +1,4 @@
-//! The JSON schemas beside the header are those of the types that cross the boundary.
+//! Consistency of the JSON schemas beside the header with the types that cross the boundary.
 
 use std::path::Path;
 
@@ -20,28 +20,28 @@ fn stands_beside_the_header(name: &str, schema: schemars::Schema) {
 
 #[test]
 fn the_task_has_a_schema() {
-    // As the host writes it.
+    // In the form that the host writes.
     let generator = SchemaGenerator::new(SchemaSettings::draft2020_12().for_serialize());
     stands_beside_the_header("platen.task-1", generator.into_root_schema_for::<Task>());
 }
 
 #[test]
 fn the_findings_have_a_schema() {
-    // As the host reads them.
+    // In the form that the host reads.
     let generator = SchemaGenerator::new(SchemaSettings::draft2020_12().for_deserialize());
     stands_beside_the_header("platen.findings-1", generator.into_root_schema_for::<Findings>());
 }
 
 #[test]
 fn the_record_has_a_schema() {
-    // As the host writes it.
+    // In the form that the host writes.
     let generator = SchemaGenerator::new(SchemaSettings::draft2020_12().for_serialize());
     stands_beside_the_header("platen.record-1", generator.into_root_schema_for::<PlateHistory>());
 }
 
 #[test]
 fn the_advice_has_a_schema() {
-    // As the host reads it.
+    // In the form that the host reads.
     let generator = SchemaGenerator::new(SchemaSettings::draft2020_12().for_deserialize());
     stands_beside_the_header("platen.advice-1", generator.into_root_schema_for::<Advice>());
 }

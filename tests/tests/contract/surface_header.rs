@@ -1,4 +1,4 @@
-//! `platen_surface.h` against the surface in Rust: the same numbers at the same places.
+//! Test of `platen_surface.h` against the surface in Rust: the same numbers at the same points.
 
 use std::process::Command;
 
@@ -7,7 +7,7 @@ use platen_shape::Surface;
 use platen_shape::surface::{Mask, SplineFit, UniformKnots};
 use platen_tests::{c_source, compile_c};
 
-/// A skew bump over 3 x 2 m, oblique in space, half of it seen.
+/// Returns a skew bump over 3 x 2 m, oblique in space, half of it seen.
 fn surface() -> Surface {
     let (u, v) = (UniformKnots::new(0.0, 3.0, 13), UniformKnots::new(0.0, 2.0, 9));
     let mut fit = SplineFit::new(u, v);

@@ -1,4 +1,5 @@
-//! `platen check` over the real program: every fault of a plant at once, each at its place, whatever else is wrong.
+//! Tests of `platen check` with the real program: every fault of a plant at once, each at its place, whatever else is
+//! wrong.
 
 use std::path::Path;
 
@@ -59,7 +60,7 @@ fn write(folder: &Path, plant: &str) -> std::path::PathBuf {
     path
 }
 
-/// Exit code and standard output.
+/// Returns exit code and standard output.
 fn check(arguments: &[&str], file: &Path) -> (Option<i32>, String) {
     let output = platen_tests::program("platen").arg("check").args(arguments).arg(file).output().unwrap();
     (output.status.code(), String::from_utf8(output.stdout).unwrap())
@@ -119,7 +120,7 @@ fn all_faults_of_a_plant_are_reported_together() {
     assert!(text.contains("plant.toml:10:8: press.link.port: found the text \"502\""), "{text}");
 }
 
-/// The faults of `text`, each without the folder.
+/// Returns the faults of `text`, each without the folder.
 fn faults(text: &str) -> Vec<String> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("plant.toml");

@@ -1,7 +1,8 @@
-//! One scene in every format and order: the same cells within each encoding's quantum, and the same verdict.
+//! Tests of one scene in every format and order: the same cells within the quantum of each encoding, and the same
+//! verdict.
 //!
-//! The files come from the simulator's own writers and go through the real driver library. Verdicts come from
-//! `platen measure`. What `platen convert` writes must give the same cells again.
+//! The files come from the simulator's own writers and are read by the real driver library. Verdicts come from `platen
+//! measure`. The output of `platen convert` must give the same cells again.
 
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
@@ -48,7 +49,7 @@ chord_mm = 2000.0
 limit_mm = 3.0
 "#;
 
-/// The scene, scanned once.
+/// Scene, scanned once.
 struct Bench {
     scan: SimScan,
     folder: tempfile::TempDir,
@@ -81,7 +82,7 @@ impl Bench {
     }
 }
 
-/// Every way of storing the scene, with half a step of its coordinates.
+/// Returns every stored form of the scene, with half a step of its coordinates.
 fn written() -> &'static [(PathBuf, f64)] {
     static WRITTEN: OnceLock<Vec<(PathBuf, f64)>> = OnceLock::new();
     WRITTEN.get_or_init(write_all)
@@ -122,7 +123,7 @@ fn write_all() -> Vec<(PathBuf, f64)> {
     files
 }
 
-/// A scanner that delivers the scene once more.
+/// Scanner that delivers the scene once more.
 struct Again(SimScan);
 
 impl Head for Again {
@@ -159,7 +160,7 @@ impl Head for Again {
     }
 }
 
-/// The scene through the stream's driver and `platen scan` into a file.
+/// Passes the scene through the driver `faro-stream` and `platen scan` into a file.
 fn streamed() -> PathBuf {
     let bench = bench();
     let bridge = Bridge::start(BridgeConfig::default(), Box::new(Again(bench.scan.clone()))).unwrap();
@@ -174,7 +175,7 @@ fn streamed() -> PathBuf {
     out
 }
 
-/// The PTX with a left-handed frame: y mirrored in the points, and in the matrix that says so.
+/// Returns the PTX with a left-handed frame: y is mirrored in the points and in the matrix.
 fn mirrored(ptx: &Path) -> PathBuf {
     let text = std::fs::read_to_string(ptx).unwrap();
     let line = |(number, line): (usize, &str)| match number {
@@ -204,13 +205,13 @@ fn read(path: &Path) -> Lattice {
     lattice
 }
 
-/// Every cell of the scene is there, within `quantum` of each coordinate, and no other.
+/// Checks that every cell of the scene is present, within `quantum` of each coordinate, and no other cell.
 #[track_caller]
 fn check_cells(path: &Path, quantum: f64) {
     let (scan, lattice) = (&bench().scan, read(path));
     let header = lattice.header();
     let steps = |angle: f64, step: f64| (angle / step).round() as usize;
-    // Files without empty cells begin at the first row and column that holds one.
+    // Files without empty cells begin at the first row and column with a cell.
     let ahead = wrap_azimuth(header.azimuth_start - scan.lattice.azimuth_start);
     let first_column = steps(ahead, scan.lattice.azimuth_step);
     let first_row = steps(scan.lattice.elevation_start - header.elevation_start, scan.lattice.elevation_step);
@@ -248,7 +249,7 @@ fn run(arguments: &[&std::ffi::OsStr]) -> serde_json::Value {
 
 fn measured(scan: &Path) -> serde_json::Value {
     let (plate, plant) = (bench().file("plate.toml"), bench().file("plant.toml"));
-    // No format says so, but the scanner of the scene has no range error beside its noise.
+    // No format contains it, but the scanner of the scene has no range error besides its noise.
     let text = "[frame]\nu_axis = [1.0, 0.0, 0.0]\n[scanner]\nplugin = \"faro-file\"\nrange_error_mm = 0.0\n";
     std::fs::write(&plant, text).unwrap();
     run(&[
@@ -290,7 +291,7 @@ fn conversions_keep_every_cell() {
     let bench = bench();
     let mut from = bench.written("origin.e57", FileFormat::E57(E57Encoding::Spherical), FileOrder::default());
     let mut quantum = 0.0;
-    // Each from the one before: errors add up.
+    // Each from the previous one: errors add up.
     for (step, (ending, adds)) in
         [("e57", 0.0), ("xyb", 0.0), ("e57", 0.0), ("ptx", 5e-7), ("xyz", 5e-7), ("xyb", 0.0), ("e57", 0.0)]
             .into_iter()
@@ -345,7 +346,7 @@ fn a_picture_shows_the_scan_and_the_decisions_are_said() {
     let bytes = std::fs::read(&picture).unwrap();
     let size = |at: usize| u32::from_be_bytes(bytes[at..at + 4].try_into().unwrap());
     assert!(bytes.starts_with(b"\x89PNG"));
-    // Equal steps: one pixel a cell.
+    // Equal steps: one pixel for each cell.
     assert_eq!(i64::from(size(16)), said["columns"].as_i64().unwrap());
     assert_eq!(i64::from(size(20)), said["rows"].as_i64().unwrap());
 }

@@ -1,4 +1,4 @@
-//! Files as a user has them: every format, damaged scans, faulty plants.
+//! Files from users: every format, damaged scans, faulty plants.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "tests fail by panicking")]
 
 mod check;

@@ -1,5 +1,5 @@
-//! Records of every released format: they open, are extended and give the same strokes; a migration that is killed leaves the old format or
-//! the new one.
+//! Tests of records of every released format: they open, are extended and give the same strokes. A migration that is
+//! killed leaves the old format or the new one.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -9,7 +9,7 @@ use platen_history::{Archive, Filter, History};
 
 /// Press of the records.
 const PRESS: u16 = 3;
-/// Names the record to the child that extends it.
+/// Environment variable with the record, for the child that extends it.
 const CHILD: &str = "PLATEN_MIGRATED_RECORD";
 /// Points at which a migration is killed.
 const POINTS: u32 = 50;
@@ -23,13 +23,13 @@ fn records() -> Vec<PathBuf> {
     files
 }
 
-/// The strokes and plates of a record, as text.
+/// Returns the strokes and plates of a record, as text.
 fn listed(path: &Path) -> String {
     let archive = Archive::open(path).unwrap();
     format!("{:#?}\n{:#?}", archive.strokes(&Filter::default()).unwrap(), archive.plates().unwrap())
 }
 
-/// `platen history list` of a record.
+/// Returns the output of `platen history list` for a record.
 fn list_verb(folder: &Path, record: &Path) -> String {
     let plant = folder.join("plant.toml");
     std::fs::write(&plant, format!("[output]\nhistory = {record:?}\n")).unwrap();
@@ -48,7 +48,7 @@ fn records_of_every_released_format_open_migrate_and_list_the_same() {
         std::fs::copy(&old, &path).unwrap();
         let (before, text) = (listed(&path), list_verb(folder.path(), &path));
         assert!(text.lines().count() > 1, "{}: {text}", old.display());
-        // The text of the release that wrote it.
+        // The text of the release that wrote the record.
         let expected = std::fs::read_to_string(old.with_extension("txt")).unwrap();
         assert_eq!(text, expected, "{}", old.display());
         drop(History::open(&path, PRESS, Timestamp::UNIX_EPOCH).unwrap());
@@ -58,7 +58,7 @@ fn records_of_every_released_format_open_migrate_and_list_the_same() {
     }
 }
 
-/// Extends a record, where the test below starts it; else it does nothing.
+/// Extends a record if it was started by the test below; otherwise does nothing.
 #[test]
 fn the_host_that_is_killed_while_it_migrates() {
     if let Some(path) = std::env::var_os(CHILD) {

@@ -1,4 +1,5 @@
-//! Bad input to `platen measure` and `platen check`: one sentence each, the right exit code, nothing left behind.
+//! Tests of invalid input to `platen measure` and `platen check`: one sentence each, the correct exit code, no files
+//! left behind.
 
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
@@ -62,7 +63,7 @@ struct Said {
     err: String,
 }
 
-/// Measures with an `--out` folder that must not be there afterwards when it fails.
+/// Measures with an `--out` folder, which must not exist afterwards if the measurement fails.
 fn measure(scan: &Path, plate: &Path, more: &[&str]) -> Said {
     static NUMBER: AtomicU32 = AtomicU32::new(0);
     let out = scan.with_extension(format!("out{}", NUMBER.fetch_add(1, Ordering::Relaxed)));
@@ -84,13 +85,13 @@ fn measure(scan: &Path, plate: &Path, more: &[&str]) -> Said {
     said
 }
 
-/// Name of a half-written folder.
+/// Returns whether a path is the name of a partial folder.
 fn is_part_of(path: &Path, out: &Path) -> bool {
     let name = |p: &Path| p.file_name().unwrap().to_string_lossy().into_owned();
     path != out && name(path).starts_with(&format!("{}.", name(out)))
 }
 
-/// One sentence on stderr that holds all of `words`, and nothing on stdout.
+/// Checks for one sentence on stderr that contains all of `words`, and no output on stdout.
 #[track_caller]
 fn check(said: &Said, code: i32, words: &[&str]) {
     assert_eq!(said.code, Some(code), "{}{}", said.out, said.err);

@@ -1,4 +1,4 @@
-//! Advice in the real host: the whole loop with an operator who follows it, and advisors that crash or hang.
+//! Advice in the real host: the closed loop with an operator who follows it, and advisors that crash or hang.
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -9,7 +9,7 @@ use serde_json::Value as Json;
 use crate::cell::{Host, Press, assert_clean, plant, until};
 use crate::screen::{address, get, state};
 
-/// Standard output of the program, which must succeed.
+/// Returns the standard output of the program, which must succeed.
 #[track_caller]
 fn said(arguments: &[&str]) -> Vec<u8> {
     let output = program("platen").args(arguments).output().unwrap();
@@ -21,7 +21,7 @@ fn json(bytes: &[u8]) -> Json {
     serde_json::from_slice(bytes).unwrap()
 }
 
-/// Advice after a run, from the file beside its result.
+/// Returns the advice after a run, from the file beside its result.
 fn advice(plant: &Path, run: u64) -> Option<Json> {
     let path = plant.with_file_name(format!("results/run-{run:06}/advice.json"));
     std::fs::read(path).ok().map(|text| json(&text))
@@ -49,7 +49,7 @@ fn a_plate_is_bent_as_advised_until_it_passes() {
     assert_eq!(scores["followed"], 1.0);
     assert!(scores["angle_inside"].as_f64().unwrap() > 0.8 && scores["gap_inside"].as_f64().unwrap() > 0.7);
 
-    // The coverage can be counted from the exported table.
+    // The coverage can be computed from the exported table.
     let table = String::from_utf8(said(&["history", "export", path])).unwrap();
     let head: Vec<&str> = table.lines().next().unwrap().split(',').collect();
     let column =
@@ -64,7 +64,7 @@ fn a_plate_is_bent_as_advised_until_it_passes() {
     let inside = angles.iter().filter(|[made, expected, to]| (made.abs() - expected).abs() <= *to).count();
     assert_eq!(inside as f64 / angles.len() as f64, scores["angle_inside"].as_f64().unwrap());
 
-    // Asked again, every stroke's advice is the same to the last byte, and the one on record.
+    // Computed again, every stroke's advice equals the recorded one to the last byte.
     for (k, stroke) in strokes.iter().enumerate() {
         let run = k as u64 + 1;
         let name = if k == 0 { "blank".to_owned() } else { stroke["stroke"].to_string() };
@@ -80,7 +80,7 @@ fn a_plate_is_bent_as_advised_until_it_passes() {
     assert_eq!(last["step"]["kind"], "done");
 }
 
-/// Figures on record and result registers of some strokes.
+/// Recorded figures and result registers of some strokes.
 #[derive(Debug, PartialEq)]
 struct Results {
     figures: Vec<Json>,
@@ -94,7 +94,8 @@ struct Run {
     log: String,
 }
 
-/// Verdict and figures of every stroke without times, and the words of each result that the press took, from verdict to gap's place.
+/// Returns verdict and figures of every stroke without times, and the words of each result that the press accepted,
+/// from the verdict to the place of the gap.
 fn results(plant: &Path, stats: &Json) -> Results {
     let figures = Host::history(plant).into_iter().map(|mut record| {
         record["figures"].as_object_mut().unwrap().retain(|name, _| !name.ends_with("_time"));
@@ -105,7 +106,7 @@ fn results(plant: &Path, stats: &Json) -> Results {
     Results { figures: figures.collect(), words: taken.iter().map(words).collect() }
 }
 
-/// Runs a blank and three strokes with an advisor; `fault` is done in each of its jobs.
+/// Runs a blank and three strokes with an advisor; `fault` occurs in each of its jobs.
 fn run(fault: Option<&str>, show: Option<&str>) -> Run {
     let folder = tempfile::tempdir().unwrap();
     let plugins = folder.path().join("plugins");
@@ -117,7 +118,7 @@ fn run(fault: Option<&str>, show: Option<&str>) -> Run {
     let plant = plant(folder.path(), &press.modbus, &format!("cell = \"{}\"", press.plate));
     if let Some(show) = show {
         let text = std::fs::read_to_string(&plant).unwrap();
-        // A hang is waited for; else a busy machine may take its time.
+        // A hang lasts until the deadline; otherwise a busy machine may need the time.
         let deadline = if fault.is_some() { 1000 } else { 30_000 };
         let more = format!(
             "[[comparison]]\nplugin = \"curvature\"\n[advice]\nplugin = \"line-bends\"\nshow = \"{show}\"\ndeadline_ms = {deadline}\n\
@@ -134,7 +135,7 @@ fn run(fault: Option<&str>, show: Option<&str>) -> Run {
         press.ask(&format!(r#"{{"do":"{ask}"}}"#));
         press.wait_taken(run);
         if show.is_some() {
-            // The next trigger would end it.
+            // The next trigger would cancel it.
             until("the advice after the stroke", || advice(&plant, run as u64));
         }
     }
@@ -165,7 +166,7 @@ fn an_advisor_that_crashes_or_hangs_costs_the_advice_alone() {
     }
 }
 
-/// The press itself counts writes outside of its blocks, and advice that stands while another stroke is measured.
+/// The press itself counts writes outside of its blocks, and advice that is valid while another stroke is measured.
 #[test]
 fn the_advice_registers_show_the_last_stroke_and_nothing_after_the_end() {
     let folder = tempfile::tempdir().unwrap();
@@ -195,7 +196,7 @@ fn the_advice_registers_show_the_last_stroke_and_nothing_after_the_end() {
         let record = until("its record", || advice(&plant, run));
         let (key, advice) = (&record["key"], &record["advice"]);
         assert_eq!(u64::from(shown[1]), key["stroke"].as_u64().unwrap(), "{}", host.log());
-        // The flag of its kind, of the bend its line.
+        // The flag of its kind and, for a bend, its line.
         let flag = match advice["step"]["kind"].as_str().unwrap() {
             "bend" => 1 << 1,
             "cannot" => 1 << 4,
@@ -207,7 +208,7 @@ fn the_advice_registers_show_the_last_stroke_and_nothing_after_the_end() {
             let mm: Vec<f64> = ends.map(|at| (1e3 * at.as_f64().unwrap()).round()).collect();
             assert_eq!(shown[4..8].iter().map(|word| f64::from(*word as i16)).collect::<Vec<_>>(), mm);
         }
-        // No depth on the panel unless it is wanted by name.
+        // No depth at the panel unless it is enabled explicitly.
         assert_eq!(shown[18..20], [0x8000, 0x8000]);
     }
     assert_eq!(host.stop(), Some(0), "{}", host.log());
@@ -216,7 +217,7 @@ fn the_advice_registers_show_the_last_stroke_and_nothing_after_the_end() {
     assert_clean(&press.stats(), &host.log());
 }
 
-/// A plant with pages and advice.
+/// Writes a plant with pages and advice.
 fn advised_plant(folder: &Path, press: &Press, show: &str) -> PathBuf {
     let path = plant(folder, &press.modbus, &format!("cell = \"{}\"", press.plate));
     let text = std::fs::read_to_string(&path).unwrap();
@@ -234,8 +235,8 @@ fn stroke(press: &mut Press, what: &str) {
     press.ask(&format!(r#"{{"do":"{what}"}}"#));
 }
 
-/// Printed: the time from a result on the page to its advice there, asked every few milliseconds over a socket. Wanted are 500 ms at most;
-/// found on a busy machine: 340 ms for the first, 102 to 139 ms for the others.
+/// Prints the time from a result on the page to its advice there, polled every few milliseconds over a socket. At most
+/// 500 ms are accepted. Found on a busy machine: 340 ms for the first, 102 to 139 ms for the others.
 #[test]
 fn advice_is_on_the_page_soon_after_the_result_and_in_no_register() {
     for show in ["shadow", "screen"] {
@@ -264,14 +265,14 @@ fn advice_is_on_the_page_soon_after_the_result_and_in_no_register() {
             );
             assert_eq!(shown["advice"]["why"].is_null(), record["advice"]["step"]["kind"] != "cannot");
         }
-        // The press has no registers for advice: a write there is one outside of the 64.
+        // The press has no advice registers: a write to them would be outside of the 64 registers.
         assert_clean(&press.stats(), &host.log());
         assert_eq!(host.stop(), Some(0), "{}", host.log());
         assert_clean(&press.stats(), &host.log());
     }
 }
 
-/// The advisor takes 0.7 s; the second stroke is made before.
+/// The advisor takes 0.7 s; the second stroke is made before it is ready.
 #[test]
 fn a_stroke_before_the_advice_was_ready_leaves_the_reason_and_no_old_advice() {
     let folder = tempfile::tempdir().unwrap();
@@ -291,7 +292,7 @@ fn a_stroke_before_the_advice_was_ready_leaves_the_reason_and_no_old_advice() {
     assert!(late["failed"].is_null(), "{late:#}");
     let shown = until("the advice after the second", || {
         let result = state(&at)["result"].take();
-        // Never that of the first.
+        // Never the reason of the first stroke.
         assert!(result["advice"]["why"].is_null() || result["run"] == 2, "{result:#}");
         (result["run"] == 2 && !result["advice"].is_null()).then_some(result)
     });
@@ -305,7 +306,7 @@ fn a_stroke_before_the_advice_was_ready_leaves_the_reason_and_no_old_advice() {
     assert_eq!(host.stop(), Some(0), "{}", host.log());
 }
 
-/// Two strokes are made while no host runs: the press's counter alone knows of the first.
+/// Two strokes are made while no host runs: only the press's counter shows the first.
 #[test]
 fn a_stroke_that_no_host_saw_is_told_with_the_next() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,4 +1,4 @@
-//! Scans that the host keeps: measured again they give the same result, and they go when they are old.
+//! Raw scans kept by the host: measured again they give the same result, and they are removed when they are old.
 
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
@@ -29,13 +29,13 @@ fn measured(scan: &Path, plant: &Path, more: &[(&str, &Path)]) -> Json {
     serde_json::from_slice(&output.stdout).unwrap()
 }
 
-/// Takes away what another run cannot share: times, and the stroke's number.
+/// Removes the parts that differ between runs: times, and the stroke's number.
 fn comparable(mut result: Json) -> Json {
     let object = result.as_object_mut().unwrap();
     object.remove("timings_ms").unwrap();
     object.remove("clock").unwrap();
     object.remove("stroke").unwrap();
-    // One of the two was read from a file, and says so: the other has a scanner.
+    // One of the two was read from a file and therefore has no scanner plugin.
     object["plugins"].as_array_mut().unwrap().retain(|plugin| plugin["kind"] != "scanner");
     let notes = object["scan"]["notes"].as_array_mut().unwrap();
     notes.retain(|note| !note.as_str().unwrap().starts_with("read from "));
@@ -67,7 +67,7 @@ fn a_kept_scan_measured_again_gives_the_same_result() {
         }
     }
 
-    // The next host removes what is too old, and no other file.
+    // The next host removes scans that are too old, and no other file.
     let old = SystemTime::now() - Duration::from_secs(61 * 86_400);
     for path in [&first, &runs[1].join("result.json")] {
         std::fs::File::options().write(true).open(path).unwrap().set_modified(old).unwrap();
@@ -145,7 +145,7 @@ fn scans_are_stored_by_rule_and_measured_again_from_the_store() {
     let with = |rule: &str| {
         std::fs::write(&plant, format!("{text}[scan_store]\nfolder = \"store\"\n{rule}\n")).unwrap();
     };
-    // A store that cannot be reached costs nothing else.
+    // An unreachable store has no other effect.
     std::fs::write(&store, "no folder").unwrap();
     with("which = [\"baseline\"]");
     let mut host = Host::start(&plant);
@@ -157,7 +157,7 @@ fn scans_are_stored_by_rule_and_measured_again_from_the_store() {
     assert_eq!(host.stop(), Some(0), "{}", host.log());
     crate::cell::assert_clean(&stats, &host.log());
 
-    // The next start copies what belongs there.
+    // The next start copies the missing scans.
     let mut host = Host::start(&plant);
     crate::cell::until("the baseline in the store", || (stored(&store).len() == 1).then_some(()));
     let record = crate::cell::until("the record of it", || {
@@ -177,7 +177,7 @@ fn scans_are_stored_by_rule_and_measured_again_from_the_store() {
         std::fs::read(runs(folder.path())[0].join("scan.e57")).unwrap()
     );
 
-    // All others, as their share says; then the kept ones may go.
+    // All other scans, selected by the share; then the kept ones may be removed.
     with("which = []\nshare = 1.0");
     let mut host = Host::start(&plant);
     crate::cell::until("all scans in the store", || (stored(&store).len() == 3).then_some(()));

@@ -1,4 +1,5 @@
-//! `platen bridge check` against the simulator's bridge, as it is and with faults: each fault fails its tests and no other.
+//! Tests of `platen bridge check` against the simulator's bridge, without and with faults: each fault fails its tests
+//! and no other.
 
 use std::net::SocketAddr;
 use std::time::Duration;
@@ -8,7 +9,7 @@ use serde_json::Value as Json;
 
 use crate::stream;
 
-/// Names of the tests with this result, of those whose names contain `only`.
+/// Returns the names of the tests with this result, of those whose names contain `only`.
 fn tests(address: SocketAddr, only: &str, result: &str) -> Vec<String> {
     let mut platen = platen_tests::program("platen");
     platen.args(["bridge", "check", &address.to_string(), "--limit-s", "5", "--only", only, "--json"]);

@@ -1,4 +1,4 @@
-//! A simulated press and the real host as processes, over real sockets.
+//! Test cell of a simulated press and the real host as processes, over real sockets.
 
 use std::io::{BufRead as _, BufReader, Write as _};
 use std::net::TcpStream;
@@ -8,10 +8,11 @@ use std::time::{Duration, Instant};
 
 use serde_json::Value as Json;
 
-/// Longest wait for anything, against tests that hang: twenty strokes take a minute and a half on a machine that is busy otherwise.
+/// Longest wait for anything, against tests that hang: twenty strokes take a minute and a half on a machine that is
+/// otherwise busy.
 pub(crate) const LIMIT: Duration = Duration::from_secs(300);
 
-/// Asks `ready` again until it answers; panics with `what` after [`LIMIT`].
+/// Calls `ready` until it returns a value; panics with `what` after [`LIMIT`].
 #[track_caller]
 pub(crate) fn until<T>(what: &str, mut ready: impl FnMut() -> Option<T>) -> T {
     let end = Instant::now() + LIMIT;
@@ -24,7 +25,7 @@ pub(crate) fn until<T>(what: &str, mut ready: impl FnMut() -> Option<T>) -> T {
     }
 }
 
-/// `platen-sim press` with its second port.
+/// Process `platen-sim press` with its second port.
 pub(crate) struct Press {
     child: Child,
     pub(crate) modbus: String,
@@ -65,7 +66,7 @@ impl Press {
         self.ask(r#"{"get":"stats"}"#)["stats"].take()
     }
 
-    /// Waits until `count` results were taken.
+    /// Waits until `count` results were accepted.
     pub(crate) fn wait_taken(&mut self, count: usize) -> Json {
         until("a result", || {
             let stats = self.stats();
@@ -77,7 +78,7 @@ impl Press {
         until("the end of the strokes", || Some(self.stats()).filter(|stats| stats["done"] == true))
     }
 
-    /// Status word of the host's block.
+    /// Returns the status word of the host's block.
     pub(crate) fn host_status(&mut self) -> u64 {
         self.ask(r#"{"get":"registers"}"#)["registers"]["h"][2].as_u64().unwrap()
     }
@@ -90,14 +91,14 @@ impl Drop for Press {
     }
 }
 
-/// A host that was killed may take long to come back on a busy machine: the press waits for it. The blank is as shops cut them: 4 mm
-/// too long, 3 mm too narrow, out of square, one edge bowed.
+/// A killed host may take long to restart on a busy machine: the press waits for it. The blank has typical cutting
+/// errors: 4 mm too long, 3 mm too narrow, out of square, one edge bowed.
 const PLATE: &str = "\n[timings]\ndown_ms = 20\nup_ms = 20\nbetween_ms = 10\nhost_ms = 60000\n\
     [plate]\ntarget = { shape = \"cylinder\", radius_mm = 9018.0, axis_deg = 90.0 }\n\
     [plate.blank]\nwidth_mm = 3000.0\nheight_mm = 2500.0\nthickness_mm = 36.0\n\
     corners_off_mm = [[-3.0, 0.75], [1.0, 2.25], [3.0, -0.75], [-1.0, -2.25]]\nbows_mm = [0.0, 2.0, 0.0, 0.0]\n";
 
-/// A plant for that press in a folder of its own; `scanner` are the simulated scanner's further options.
+/// Writes a plant for that press in a folder of its own; `scanner` are the simulated scanner's further options.
 pub(crate) fn plant(folder: &Path, modbus: &str, scanner: &str) -> PathBuf {
     let plates = platen_tests::repository().join("config/plates");
     let port = modbus.rsplit(':').next().unwrap();
@@ -114,7 +115,7 @@ pub(crate) fn plant(folder: &Path, modbus: &str, scanner: &str) -> PathBuf {
     path
 }
 
-/// `platen run` on a plant file.
+/// Process `platen run` on a plant file.
 pub(crate) struct Host {
     child: Child,
     plant: PathBuf,
@@ -125,19 +126,19 @@ impl Host {
         Self::run(platen_tests::program("platen"), plant)
     }
 
-    /// A host that finds its plugins in `plugins` first.
+    /// Starts a host that searches `plugins` first.
     pub(crate) fn with_plugins(plant: &Path, plugins: &Path) -> Self {
         let mut program = platen_tests::program("platen");
         program.arg("--plugins").arg(plugins);
         Self::run(program, plant)
     }
 
-    /// Number of its process.
+    /// Returns its process identifier.
     pub(crate) fn process(&self) -> u32 {
         self.child.id()
     }
 
-    /// A host on a full disk: it cannot write any file beyond so many bytes.
+    /// Starts a host on a full disk: it cannot write a file larger than `file_bytes`.
     pub(crate) fn on_full_disk(plant: &Path, file_bytes: u32) -> Self {
         let library = plant.with_file_name("libfull_disk.so");
         platen_tests::compile_c(&platen_tests::c_source("full_disk.c"), &library, &["-shared", "-fPIC"]);
@@ -146,14 +147,14 @@ impl Host {
         Self::run(program, plant)
     }
 
-    /// A host that systemd would have started, with this socket to tell it.
+    /// Starts a host as systemd would, with this socket for its notifications.
     pub(crate) fn notifying(plant: &Path, socket: &Path) -> Self {
         let mut program = platen_tests::program("platen");
         program.env("NOTIFY_SOCKET", socket);
         Self::run(program, plant)
     }
 
-    /// A host whose realtime clock is off by the seconds in the file `shift`.
+    /// Starts a host whose realtime clock is off by the seconds in the file `shift`.
     pub(crate) fn with_shifted_clock(plant: &Path, shift: &Path) -> Self {
         let library = plant.with_file_name("libshifted_clock.so");
         let arguments = ["-shared", "-fPIC", "-Wno-pedantic"];
@@ -181,7 +182,7 @@ impl Host {
         assert!(done.unwrap().success());
     }
 
-    /// Ends it with SIGTERM and gives its exit code.
+    /// Ends it with SIGTERM and returns its exit code.
     pub(crate) fn stop(&mut self) -> Option<i32> {
         self.signal("TERM");
         until("the end of the host", || self.child.try_wait().unwrap()).code()
@@ -196,14 +197,14 @@ impl Host {
         std::fs::read_to_string(self.plant.with_extension("log")).unwrap_or_default()
     }
 
-    /// `platen status --json`, once there is one.
+    /// Returns the output of `platen status --json`, once there is one.
     pub(crate) fn status(&self) -> Option<Json> {
         let output =
             platen_tests::program("platen").arg("status").arg(&self.plant).arg("--json").output().unwrap();
         serde_json::from_slice(&output.stdout).ok()
     }
 
-    /// `platen history list --json`.
+    /// Returns the output of `platen history list --json`.
     pub(crate) fn history(plant: &Path) -> Vec<Json> {
         let output = platen_tests::program("platen")
             .args(["history", "list", "--newest", "100000", "--json"])
@@ -221,7 +222,7 @@ impl Drop for Host {
     }
 }
 
-/// Acts that are forbidden to every host, as counted by the press.
+/// Asserts that no act occurred that is forbidden to every host, as counted by the press.
 #[track_caller]
 pub(crate) fn assert_clean(stats: &Json, log: &str) {
     let writes = ["writes_outside", "writes_before_sync", "writes_while_void"];

@@ -1,4 +1,5 @@
-//! The clock of a running host set back and forth by a day: the order of the strokes stays, nothing is removed, and the record has the jumps.
+//! Clock jumps of a running host by a day back and forth: the order of the strokes is kept, nothing is removed, and the
+//! record contains the jumps.
 
 use std::io::Write as _;
 use std::path::Path;
@@ -9,7 +10,7 @@ use crate::cell::{Host, Press, assert_clean, plant, until};
 
 const DAY: i64 = 86_400;
 
-/// Sets the clock of the host off by so many seconds: in place, since the host has the file mapped.
+/// Shifts the clock of the host by this many seconds; the file is written in place, since the host has mapped it.
 fn set(shift: &Path, seconds: i64) {
     let mut file = std::fs::File::options().write(true).create(true).truncate(false).open(shift).unwrap();
     file.write_all(&seconds.to_ne_bytes()).unwrap();

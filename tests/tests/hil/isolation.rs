@@ -1,6 +1,7 @@
 //! Isolation of plugins in worker processes: plugins that fail in every way, in the real host at a simulated press.
 //!
-//! Asserted are the result of the stroke and that the host goes on; the error of each single fault is tested in `contract::misbehaviour`.
+//! The tests assert the result of the stroke and that the host continues; the error of each single fault is tested in
+//! `contract::misbehaviour`.
 
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -20,7 +21,7 @@ fn start(folder: &Path, config: &str, more: &str) -> (Press, PathBuf) {
     (press, plant)
 }
 
-/// The workers of a host: their process numbers.
+/// Returns the workers of a host: their process identifiers.
 fn workers(host: u32) -> Vec<u32> {
     let children = std::fs::read_dir(format!("/proc/{host}/task")).unwrap().flatten();
     let children = children.filter_map(|task| std::fs::read_to_string(task.path().join("children")).ok());
@@ -105,11 +106,11 @@ fn the_host_maps_no_plugin_and_its_workers_end_with_it() {
         assert!(plugin["confinement"].as_str().is_some_and(|text| !text.is_empty()), "{plugin}");
     }
 
-    // SIGTERM works though the driver ignores it, and takes the workers along.
+    // SIGTERM works although the driver ignores it, and ends the workers too.
     assert_eq!(host.stop(), Some(0), "{}", host.log());
     assert!(all.iter().all(|worker| maps(*worker).is_empty()), "{}", host.log());
 
-    // So does kill -9 in the middle of a scan.
+    // The same holds for kill -9 in the middle of a scan.
     let host = Host::with_plugins(&plant, &plugins);
     stroke(&mut press);
     until("busy", || (press.host_status() & 2 == 2).then_some(()));
@@ -128,7 +129,7 @@ fn a_plugin_that_fails_too_often_is_out_of_use_until_its_file_is_replaced() {
     let (mut press, plant) = start(folder.path(), "strokes = 8\nautomatic = false", "");
     let mut host = Host::with_plugins(&plant, &plugins);
     stroke(&mut press);
-    // The second time is the second fault; the third is that of the next stroke.
+    // The second attempt is the second fault; the third occurs at the next stroke.
     press.wait_taken(1);
     stroke(&mut press);
     press.wait_taken(2);
@@ -148,7 +149,7 @@ fn a_plugin_that_fails_too_often_is_out_of_use_until_its_file_is_replaced() {
         "{held:#}"
     );
 
-    // Another build of the library, while the host runs.
+    // Another build of the library is installed while the host runs.
     std::fs::copy(platen_tests::library("harmonic"), plugins.join("new")).unwrap();
     std::fs::rename(plugins.join("new"), plugins.join("libharmonic.so")).unwrap();
     stroke(&mut press);
@@ -157,7 +158,7 @@ fn a_plugin_that_fails_too_often_is_out_of_use_until_its_file_is_replaced() {
     assert_clean(&stats, &log);
     assert_ne!(stats["taken"][2]["words"][55], 0xFFFF, "measured: {stats:#}\n{log}");
 
-    // The faulty build is still held; released by name it may fail again.
+    // The faulty build is still quarantined; released by name it may fail again.
     assert_eq!(list("clear")[0]["plugin"], "harmonic");
     assert_eq!(list("list"), serde_json::json!([]));
     assert_eq!(host.stop(), Some(0), "{log}");
@@ -173,7 +174,7 @@ fn strokes_whose_driver_dies_at_any_moment_are_measured_or_reported() {
         start(folder.path(), &format!("strokes = 5\nparts = {parts}\nbaseline = false"), "");
     let mut host = Host::with_plugins(&plant, &plugins);
     let stats = loop {
-        // Out of use after too many faults, and released by who looks after it.
+        // Out of use after too many faults, then released by the maintainer.
         if folder.path().join("results/quarantine.json").exists() {
             let mut platen = platen_tests::program("platen");
             platen.args(["plugins", "quarantine", "clear"]).arg(&plant).output().unwrap();
@@ -202,7 +203,7 @@ fn strokes_whose_driver_dies_at_any_moment_are_measured_or_reported() {
 fn the_figures_of_another_comparison_reach_no_register() {
     let folder = tempfile::tempdir().unwrap();
     let plugins = folder.path().join("plugins");
-    // It says "pass" and a largest gap of 0.
+    // It reports "pass" and a largest gap of 0.
     faulty(&plugins, "curvature", "word", "gap_0", 0);
     let (mut press, plant) = start(folder.path(), "strokes = 1", "[[comparison]]\nplugin = \"curvature\"\n");
     let mut host = Host::with_plugins(&plant, &plugins);

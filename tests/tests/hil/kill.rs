@@ -1,7 +1,8 @@
-//! `kill -9` of the real host: at each point of a stroke, and at random. Every stroke is delivered once or reported.
+//! Crash tests with `kill -9` of the real host, at each point of a stroke and at random. Every stroke is delivered once
+//! or reported.
 //!
-//! The press holds the host at the point by what it does, so no point is hit by luck. `PLATEN_KILLS=500` sets the number
-//! of random kills.
+//! The press holds the host at the point by its own behaviour, so no point depends on chance. `PLATEN_KILLS=500` sets
+//! the number of random kills.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -15,7 +16,7 @@ const BUSY: u64 = 1 << 1;
 const VALID: u64 = 1 << 2;
 const SCAN_DONE: u64 = 1 << 7;
 
-/// A press that strokes on request, and its plant.
+/// Starts a press that makes strokes on request, and writes its plant.
 fn cell_on_request() -> (tempfile::TempDir, Press, PathBuf) {
     let folder = tempfile::tempdir().unwrap();
     let press = Press::start(folder.path(), "automatic = false");
@@ -36,7 +37,7 @@ fn wait_ready(press: &mut Press) {
     until("ready", || (press.host_status() & (1 | BUSY) == 1).then_some(()));
 }
 
-/// The stroke has its result on record.
+/// Waits until the stroke has a recorded result.
 fn wait_on_record(plant: &Path, stroke: usize) {
     until("the result on record", || {
         Host::history(plant)
@@ -46,7 +47,7 @@ fn wait_on_record(plant: &Path, stroke: usize) {
     });
 }
 
-/// Where a stroke is held until the host is killed, and what lets it go on afterwards.
+/// Point at which a stroke is held until the host is killed, and the action that lets it continue afterwards.
 struct Point {
     name: &'static str,
     before: &'static str,
@@ -149,7 +150,7 @@ fn a_host_killed_at_each_point_of_a_stroke() {
     check_record(&Host::history(&plant), POINTS.len());
 }
 
-/// No stroke is on record twice, none without its end.
+/// Checks that no stroke is recorded twice, and none without its end.
 fn check_record(history: &[Json], strokes: usize) {
     let keys: BTreeSet<String> = history.iter().map(|record| record["key"].to_string()).collect();
     assert_eq!((keys.len(), history.len()), (strokes, strokes), "{history:#?}");
@@ -168,13 +169,13 @@ fn a_host_killed_at_random() {
     let mut random = fastrand::Rng::with_seed(seed);
     for _ in 0..kills {
         let host = Host::start(&plant);
-        // The wait is not for something to happen: its length is the random moment of the kill.
+        // Not a wait for an event: its length is the random moment of the kill.
         std::thread::sleep(std::time::Duration::from_millis(random.u64(50..1500)));
         host.kill();
     }
     let mut host = Host::start(&plant);
     order(&mut press, r#"{"automatic":false}"#);
-    // No stroke is on its way any more: state 2 is a ram at rest.
+    // No stroke is in progress any more: state 2 is a ram at rest.
     until("the ram at rest", || {
         (press.ask(r#"{"get":"registers"}"#)["registers"]["p"][6] == 2).then_some(())
     });

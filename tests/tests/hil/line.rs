@@ -1,4 +1,4 @@
-//! Every fault of the line, one by one and mixed, on TCP, on RTU through TCP and on a serial line.
+//! Tests of every fault of the line, one by one and mixed, on TCP, on RTU through TCP and on a serial line.
 //!
 //! After each run the press has all its results, each under its own stroke, each scanned once.
 
@@ -14,12 +14,12 @@ use platen_sim_press::{Command, Config, Counters, SimPress};
 
 const SCAN: Duration = Duration::from_millis(5);
 
-/// On a serial line late answers reach whoever has it open next: the host must be quiet for longer than that.
+/// On a serial line late answers reach the next process that opens it: the host must be silent for longer than that.
 const LATE_MS: [u64; 2] = [120, 300];
 
 type Set = fn(&mut LineFaults);
 
-/// Enough to hit most strokes of a run, and little enough that lines come up again.
+/// Enough to affect most strokes of a run, and few enough that lines recover.
 const FAULTS: [(&str, Set); 14] = [
     ("late", |it| it.late = 0.02),
     ("reset before", |it| it.reset = 0.03),
@@ -94,7 +94,7 @@ async fn late_answers_and_resets_on_many_strokes() {
     host.stop().await;
 }
 
-/// A press on a pseudo terminal, and what the product is told of it.
+/// Starts a press on a pseudo terminal; returns also the product's description of it.
 async fn serial(config: Config) -> (SimPress, Press, tempfile::TempDir) {
     let folder = tempfile::tempdir().unwrap();
     let device = folder.path().join("adapter");
@@ -199,7 +199,7 @@ async fn exceptions_that_pass_cost_no_stroke() {
         let line_faults = LineFaults { exception: 0.05, exception_code, ..LineFaults::default() };
         let press = SimPress::start(Config { strokes: 6, line_faults, ..quick() }).await.unwrap();
         let mut plant = tcp(press.modbus().unwrap());
-        // An answer that a busy machine delays beyond the usual 300 ms would end the connection too.
+        // An answer delayed by a busy machine beyond the usual 300 ms would also end the connection.
         plant.link.response_timeout = LIMIT;
         let host = Host::start(plant, Memory::new(7), press.control(), SCAN);
         let counters = done(&press, &host).await;

@@ -1,5 +1,5 @@
-//! Hardware in the loop, the hardware simulated: the product's press side, its host and its scanner driver on real sockets
-//! and lines, most as processes of their own.
+//! Hardware in the loop with simulated hardware: the product's press side, its host and its scanner driver on real
+//! sockets and lines, most as processes of their own.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "tests fail by panicking")]
 
 mod cell;

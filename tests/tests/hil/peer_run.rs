@@ -1,7 +1,8 @@
-//! The real `platen run` driven by a press on another Modbus stack, its words read by a third.
+//! Peer test of the real `platen run`: it is driven by a press on another Modbus stack, and its words are read by a
+//! third.
 //!
-//! Needs pymodbus (a Python that has it in `PLATEN_PYTHON`, else `python3`) and mbpoll. Where they are missing the test
-//! says so and ends; with `PLATEN_PEERS=all`, as in CI, that is a failure.
+//! The test needs pymodbus (a Python that has it in `PLATEN_PYTHON`, else `python3`) and mbpoll. If they are missing,
+//! the test prints so and ends; with `PLATEN_PEERS=all`, as in CI, that is a failure.
 
 use std::io::{BufRead as _, BufReader};
 use std::process::{Command, Stdio};
@@ -28,7 +29,7 @@ fn a_pymodbus_press_gets_twenty_right_results() {
         return;
     }
     let folder = tempfile::tempdir().unwrap();
-    // The press waits 30 s for a host; what is not built yet takes longer.
+    // The press waits 30 s for a host; a build takes longer.
     platen_tests::built();
     let peers = platen_tests::repository().join("tests/peers");
     let mut press = Command::new(python())
@@ -43,7 +44,8 @@ fn a_pymodbus_press_gets_twenty_right_results() {
     let plant = plant(folder.path(), &address, "shape = \"cylinder\"\nradius_mm = 9018.0");
     let mut host = Host::start(&plant);
 
-    // While it runs, and the press leaves every result standing for 0.3 s, mbpoll reads the words that stand in the press's registers for the host's newest result.
+    // While it runs, and the press leaves every result valid for 0.3 s, mbpoll reads the words of the host's newest
+    // result in the press's registers.
     let words = crate::cell::until("mbpoll", || {
         let output =
             Command::new(peers.join("mbpoll_words.sh")).args([&address, "100", "64"]).output().unwrap();

@@ -1,7 +1,8 @@
-//! The product's press side against presses that others' stacks serve, and what mbpoll reads of the same registers.
+//! Peer tests of the product's press side against presses on other Modbus stacks, and readings of the same registers by
+//! mbpoll.
 //!
-//! The peers and what they need are in `tests/peers/README.md`. Where one is not installed its test says so and
-//! ends; with `PLATEN_PEERS=all`, as in CI, that is a failure.
+//! The peers and their requirements are described in `tests/peers/README.md`. If one is not installed, its test prints
+//! so and ends; with `PLATEN_PEERS=all`, as in CI, that is a failure.
 
 use std::io::{BufRead, BufReader, Lines};
 use std::path::{Path, PathBuf};
@@ -20,7 +21,7 @@ fn peers() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("peers")
 }
 
-/// Whether `program` can be run with `arguments`; a peer that is missing fails where all are wanted.
+/// Returns whether `program` can be run with `arguments`; a missing peer is a failure if all are required.
 fn installed(program: &str, arguments: &[&str]) -> bool {
     let run = Command::new(program).args(arguments).stdout(Stdio::null()).stderr(Stdio::null()).status();
     let there = run.is_ok_and(|status| status.success());
@@ -32,7 +33,7 @@ fn installed(program: &str, arguments: &[&str]) -> bool {
     there
 }
 
-/// A press in a process of its own.
+/// Press in a process of its own.
 struct Peer {
     child: Child,
     lines: Lines<BufReader<ChildStdout>>,
@@ -44,12 +45,12 @@ impl Peer {
         let mut child = command.stdout(Stdio::piped()).spawn().unwrap();
         let mut lines = BufReader::new(child.stdout.take().unwrap()).lines();
         let first: Value = serde_json::from_str(&lines.next().unwrap().unwrap()).unwrap();
-        // A press on a serial line has none.
+        // A press on a serial line has no port.
         let port = first["port"].as_u64().unwrap_or(0).try_into().unwrap();
         Self { child, lines, port }
     }
 
-    /// Its summary, once all strokes are made or it has given up; it must be content.
+    /// Returns its summary, once all strokes are made or it has given up; the summary must report success.
     fn summary(mut self) -> Value {
         let summary = self.lines.next().unwrap().unwrap();
         let summary: Value = serde_json::from_str(&summary).unwrap();
@@ -58,7 +59,7 @@ impl Peer {
     }
 }
 
-/// A line or a gateway of socat's, gone when dropped.
+/// Line or gateway of socat, ended when dropped.
 struct Socat {
     child: Child,
     /// Links to its terminals.
@@ -66,14 +67,14 @@ struct Socat {
 }
 
 impl Socat {
-    /// Two pseudo terminals with their lines joined, linked as `a` and `b` in `folder`.
+    /// Creates two pseudo terminals with their lines joined, linked as `a` and `b` in `folder`.
     fn line(folder: &Path) -> Self {
         let links = ["a", "b"].map(|name| folder.join(name));
         let ends = links.each_ref().map(|link| format!("pty,raw,echo=0,link={}", link.display()));
         Self::start(&ends, "starting data transfer", links.into()).0
     }
 
-    /// A port that passes what comes to a serial device; one connection at a time opens it.
+    /// Creates a port that passes its data to a serial device; one connection at a time opens it.
     fn gateway(device: &Path) -> (Self, u16) {
         let device = format!("{},raw,echo=0", device.display());
         let listen = "TCP-LISTEN:0,bind=127.0.0.1,reuseaddr,fork,nodelay".to_owned();
@@ -94,7 +95,8 @@ impl Socat {
 }
 
 impl Drop for Socat {
-    /// Removes the links first, as those of an unplugged adapter are: another test may get a terminal of the same number a moment later.
+    /// Removes the links first, like those of an unplugged adapter: another test may get a terminal with the same
+    /// number a moment later.
     fn drop(&mut self) {
         for link in &self.links {
             let _ = std::fs::remove_file(link);
@@ -104,7 +106,7 @@ impl Drop for Socat {
     }
 }
 
-/// Serves `peer` until it has all its strokes; the scanner looks at a plate that is never bent.
+/// Serves `peer` until it has all its strokes; the scanner measures a plate that is never bent.
 async fn serve(peer: Peer) -> Value {
     let address = ([127, 0, 0, 1], peer.port).into();
     serve_on(peer, tcp(address)).await
@@ -168,7 +170,8 @@ async fn mbpoll_reads_the_words_of_the_result() {
     assert!(read.status.success(), "{read:?}");
     let words: Vec<u16> = serde_json::from_slice(&read.stdout).unwrap();
     let last = &counters.taken.last().unwrap().words;
-    // Heartbeat, status and host state go on after the result was taken; the warning and its check sum may.
+    // Heartbeat, status and host state continue after the result was accepted; the warning and its checksum may also
+    // change.
     let stable = |words: &[u16]| [&words[3..7], &words[8..52], &words[53..54], &words[55..64]].concat();
     assert_eq!(stable(&words), stable(last));
     host.stop().await;

@@ -1,5 +1,5 @@
-//! The example plants of `config/`: each is loaded and run against a press of its kind; only the way to the press
-//! is the test's own.
+//! Tests of the example plants of `config/`: each is loaded and run against a press of its kind; only the connection to
+//! the press belongs to the test.
 
 use std::future::{Ready, ready};
 use std::net::SocketAddr;
@@ -20,14 +20,14 @@ use tokio_modbus::server::tcp::{Server, accept_tcp_connection};
 const SCAN: Duration = Duration::from_millis(5);
 const STROKES: u32 = 6;
 
-/// The press of an example plant, told to measure.
+/// Returns the press of an example plant, in mode `measure`.
 fn example(name: &str) -> Press {
     let file = platen_tests::repository().join("config").join(name);
     let press = PlantFile::load(&file).unwrap().press.unwrap();
     Press { mode: Mode::Measure, ..press }
 }
 
-/// Runs an example on a simulated press that has its number; everything is judged there.
+/// Runs an example on a simulated press that has its number; all checks are made there.
 async fn run(press: Press, sim: SimPress) {
     let host = Host::start(press, Memory::new(7), sim.control(), SCAN);
     judge(host, sim).await;
@@ -65,7 +65,8 @@ async fn the_press_on_a_serial_line() {
     run(press, sim).await;
 }
 
-/// The client blocks of a press: carries its block to the host and the host's block back, until one of them is gone.
+/// Runs the client blocks of a press: they carry its block to the host and the host's block back, until one of the two
+/// has ended.
 async fn client_blocks(press: SocketAddr, host: SocketAddr) {
     let ask = async |at| tcp::connect_slave(at, Slave(1)).await.unwrap();
     let (mut press, mut host) = (ask(press).await, ask(host).await);
@@ -94,17 +95,17 @@ async fn the_press_that_asks() {
     judge(host, sim).await;
 }
 
-/// A controller with bits only: the program of `platen press map config/plant-bits.toml`, cycle by cycle.
+/// Controller with bits only: the program of `platen press map config/plant-bits.toml`, cycle by cycle.
 #[derive(Debug, Default)]
 struct BitPress {
-    /// 40201, the press's register.
+    /// Register 40201 of the press.
     p: u16,
-    /// 40301 and on, the host's.
+    /// Registers from 40301 on, of the host.
     h: [u16; 3],
     to_do: u32,
     waiting: bool,
     accepted: bool,
-    /// Figures of the results taken, with pass and fail.
+    /// Figures of the accepted results, with pass and fail.
     results: Vec<(u16, i16, bool, bool)>,
     writes_outside: usize,
 }
@@ -199,9 +200,9 @@ async fn the_press_with_bits_only() {
             program.lock().unwrap().cycle();
         }
     });
-    // The scanner looks at a plate that is never bent.
+    // The scanner measures a plate that is never bent.
     let cell = SimPress::start(Config { automatic: false, ..quick() }).await.unwrap();
-    // Long enough for the press to see busy: it has nothing else to know its stroke by.
+    // Long enough for the press to see busy, by which alone it identifies its stroke.
     let mut host = Host::start(press, Memory::new(7), cell.control(), Duration::from_millis(200));
     host.until("every result acknowledged", |status| {
         status.metrics.result_to_ack.count == u64::from(STROKES)

@@ -1,4 +1,4 @@
-//! Strokes over real sockets: the press counts, the press asserts.
+//! Tests of strokes over real sockets; the press counts and the tests assert on its counters.
 
 use std::time::Duration;
 
@@ -218,7 +218,7 @@ async fn a_killed_host_delivers_or_reports_every_stroke() {
     let mut kills = 0;
     let start = || Host::start(tcp(press.modbus().unwrap()), journal.clone(), press.control(), ms(30));
     let mut host = start();
-    // The wait is not for something to happen: its length is the random moment of the kill.
+    // Not a wait for an event: its length is the random moment of the kill.
     while press.until("done", ms(random.u64(30..200)), |counters| counters.done).await.is_err() {
         host.kill().await;
         kills += 1;

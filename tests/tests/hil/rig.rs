@@ -1,7 +1,8 @@
-//! The simulated press and the product's press side on real sockets, with a scanner that only counts.
+//! Test rig: the simulated press and the product's press side on real sockets, with a scanner that only counts.
 //!
-//! The scanner asks the press's second port what plate lies there and reports the number of its bends as a gap: a
-//! result under the wrong stroke shows in the press's own count. Everything is asserted on the press's side.
+//! The scanner requests the state of the plate at the press's second port and reports the number of its bends as a gap.
+//! A result under the wrong stroke is therefore visible in the press's own count. All assertions are made on the
+//! press's side.
 
 use std::collections::BTreeMap;
 use std::convert::Infallible;
@@ -22,11 +23,12 @@ use tokio::net::TcpStream;
 use tokio::sync::{mpsc, watch};
 use tokio::task::{JoinHandle, JoinSet};
 
-/// Longer than any of these tests takes on a busy machine.
+/// Longer than the duration of any of these tests on a busy machine.
 pub(crate) const LIMIT: Duration = Duration::from_secs(300);
 
-/// A press whose ram hardly takes time, with a programme of 70 light strokes. It waits a minute, not 2 s, for a host without a
-/// heartbeat: how soon a host reconnects depends on its back-off and on the machine, and is tested in virtual time.
+/// Returns a press whose ram is very fast, with a programme of 70 light strokes. It waits a minute, not 2 s, for a host
+/// without a heartbeat: the time until a host reconnects depends on its back-off and on the machine, and is tested in
+/// virtual time.
 pub(crate) fn quick() -> Config {
     let timings = Timings {
         cycle_ms: 2,
@@ -47,12 +49,12 @@ pub(crate) fn quick() -> Config {
     }
 }
 
-/// Plant description of a press at `address`.
+/// Returns the plant description of a press at `address`.
 pub(crate) fn tcp(address: SocketAddr) -> Press {
     Press::pph1("Press 3", 3, Link::tcp(address.ip().to_string(), address.port(), 1))
 }
 
-/// Runs cells beside each other: each has a press, a line and a host of its own, and mostly waits.
+/// Runs cells concurrently: each has a press, a line and a host of its own, and is idle most of the time.
 pub(crate) async fn beside_each_other<F: Future<Output = ()> + Send + 'static>(
     cells: impl IntoIterator<Item = F>,
 ) {
@@ -62,7 +64,7 @@ pub(crate) async fn beside_each_other<F: Future<Output = ()> + Send + 'static>(
     }
 }
 
-/// A journal in memory: what would be on the disk, whatever becomes of the host.
+/// Journal in memory: the content of the disk, which survives the host.
 #[derive(Clone, Debug)]
 pub(crate) struct Memory {
     owner: u16,
@@ -74,7 +76,7 @@ impl Memory {
         Self { owner, records: Arc::default() }
     }
 
-    /// How often each stroke was accepted.
+    /// Returns how often each stroke was accepted.
     pub(crate) fn accepted(&self) -> BTreeMap<StrokeKey, usize> {
         let mut accepted = BTreeMap::new();
         for record in self.records.lock().unwrap().iter() {
@@ -127,13 +129,13 @@ pub(crate) struct Host {
 }
 
 impl Host {
-    /// Starts on `press` with a scan of `scan`; the plate is asked for at `cell`.
+    /// Starts on `press` with a scan of `scan`; the plate is requested at `cell`.
     pub(crate) fn start(press: Press, journal: Memory, cell: SocketAddr, scan: Duration) -> Self {
         let link = PressLink::new(&press);
         Self::on(press, link, journal, cell, scan)
     }
 
-    /// Starts on a link that is there already.
+    /// Starts on an existing link.
     pub(crate) fn on(
         press: Press,
         link: PressLink,
@@ -149,27 +151,27 @@ impl Host {
         Self { status: host.status, heard, answers, run, desk }
     }
 
-    /// Ends it as a signal would and waits for its last writes.
+    /// Ends it like a signal and waits for its last writes.
     pub(crate) async fn stop(self) {
         self.answers.send(Answer::Stop).unwrap();
         self.run.await.unwrap();
         self.desk.abort();
     }
 
-    /// Ends it as a power cut would.
+    /// Ends it like a power cut.
     pub(crate) async fn kill(self) {
         self.run.abort();
         self.desk.abort();
-        // Both were cancelled: that is their result.
+        // Both were cancelled, which is their result.
         let _ = (self.run.await, self.desk.await);
     }
 
-    /// The operator resets faults.
+    /// Resets faults like the operator.
     pub(crate) fn reset(&self) {
         self.answers.send(Answer::Reset).unwrap();
     }
 
-    /// Waits until `holds` is true of how things stand.
+    /// Waits until `holds` is true of the status.
     pub(crate) async fn until(&mut self, what: &str, holds: impl FnMut(&Status) -> bool) {
         let waited =
             tokio::time::timeout(LIMIT, self.status.wait_for(holds)).await.map(|found| found.map(|_| ()));
@@ -181,7 +183,7 @@ impl Host {
     }
 }
 
-/// The host's desk: scanner and evaluation.
+/// Scanner and evaluation of the host.
 async fn desk(
     mut orders: mpsc::UnboundedReceiver<Order>,
     answers: mpsc::UnboundedSender<Answer>,
@@ -191,7 +193,7 @@ async fn desk(
 ) {
     let bends: Arc<Mutex<BTreeMap<StrokeKey, u32>>> = Arc::default();
     let tell = |answer| {
-        // The press side may have ended: then nobody needs the answer.
+        // The press side may have ended; then the answer is not needed.
         let _ = answers.send(answer);
     };
     tell(Answer::Scanner { ready: Ok(()), estimate: Some(Duration::from_secs(20)) });
@@ -227,7 +229,7 @@ async fn desk(
     }
 }
 
-/// How often the plate in the press was bent; `None` while it moves or is not there.
+/// Returns how often the plate in the press was bent; `None` while it moves or is missing.
 async fn look(cell: SocketAddr) -> Option<u32> {
     let stream = TcpStream::connect(cell).await.unwrap();
     let (reader, mut writer) = stream.into_split();
@@ -237,7 +239,7 @@ async fn look(cell: SocketAddr) -> Option<u32> {
     reply["plate"]["strokes"].as_u64().map(|strokes| strokes.try_into().unwrap())
 }
 
-/// A gap that names the bend it belongs to; it never passes.
+/// Returns a gap that identifies its bend; it never passes.
 fn measurement(strokes: u32) -> Measurement {
     let values = BTreeMap::from([
         (Measure::GapMax, f64::from(1000 + strokes) * 1e-5),

@@ -1,4 +1,5 @@
-//! The real `platen run` against the simulated press: every check is made on the press's side or on the record.
+//! Tests of the real `platen run` against the simulated press: every check is made on the press's side or on the
+//! record.
 
 use crate::cell::{Host, Press, assert_clean, plant, until};
 
@@ -43,7 +44,7 @@ fn strokes_are_measured_recorded_and_answered() {
     two_plates_are_compared(&plant);
 }
 
-/// Each plate's first scan tells the outline of its blank, and its strokes keep it.
+/// Checks that each plate's first scan gives the outline of its blank, and that its strokes keep it.
 fn strokes_are_mapped_to_their_blank(outlines: &[serde_json::Value]) {
     for plate in outlines.chunks(3) {
         let blank = &plate[0];
@@ -58,13 +59,14 @@ fn strokes_are_mapped_to_their_blank(outlines: &[serde_json::Value]) {
     assert_ne!(outlines[0], outlines[3], "two scans of two blanks");
 }
 
-/// Two strokes of different plates in (u, v).
+/// Compares two strokes of different plates in (u, v).
 fn two_plates_are_compared(plant: &std::path::Path) {
     let compare = |first: &str, second: &str| {
         let mut program = platen_tests::program("platen");
         program.args(["history", "compare"]).arg(plant).args([first, second, "--json"]).output().unwrap()
     };
-    // The second stroke of two plates bent alike, numbered on by the press, and the blank of one against a bent one.
+    // The second strokes of two plates that are bent alike, numbered consecutively by the press; and the blank of one
+    // against the bent other.
     let moved = |first: &str, second: &str| {
         let output = compare(first, second);
         let said = String::from_utf8_lossy(&output.stderr);
@@ -187,7 +189,7 @@ fn a_missing_calibration_takes_ready_off_until_it_is_there() {
         let registers = press.ask(r#"{"get":"registers"}"#);
         (registers["registers"]["h"][6] == 207).then_some(())
     });
-    // Bit 11 says that the calibration is not valid, bit 0 would say ready.
+    // Bit 11 is set because the calibration is not valid; bit 0 would mean ready.
     assert_eq!(press.host_status() & (1 << 11 | 1), 1 << 11);
     assert!(press.stats()["taken"].as_array().unwrap().is_empty());
 
@@ -210,7 +212,7 @@ fn a_missing_calibration_takes_ready_off_until_it_is_there() {
     assert_eq!(host.stop(), Some(0), "{}", host.log());
 }
 
-/// Words of the newest result that the press took.
+/// Returns the words of the newest result that the press accepted.
 fn newest_words(stats: &serde_json::Value) -> Vec<u64> {
     let words = stats["taken"].as_array().unwrap().last().unwrap()["words"].as_array().unwrap();
     words.iter().map(|word| word.as_u64().unwrap()).collect()
@@ -220,7 +222,7 @@ fn run_on_full_disk(file_bytes: u32, wanted: &str) {
     let folder = tempfile::tempdir().unwrap();
     let mut press = Press::start(folder.path(), "strokes = 2\nautomatic = false");
     let plant = plant(folder.path(), &press.modbus, &format!("cell = \"{}\"", press.plate));
-    // The history must exist: a host that cannot open it does not start at all.
+    // The history must exist: a host that cannot open it does not start.
     let mut first = Host::start(&plant);
     until("ready", || (press.host_status() & 1 == 1).then_some(()));
     assert_eq!(first.stop(), Some(0), "{}", first.log());

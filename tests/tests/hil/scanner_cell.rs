@@ -1,6 +1,8 @@
-//! Whole cell: host, simulated press on Modbus, and simulated scanner by the scan bridge protocol or as a folder of files. Each is a process
-//! of its own, connected by sockets and files only, but for one test whose scanner moves the plate. The results that the press accepted are
-//! compared with the host's record and with the known plate.
+//! Test of a whole cell: host, simulated press on Modbus, and simulated scanner by the scan bridge protocol or as a
+//! folder of files.
+//!
+//! Each is a process of its own, connected only by sockets and files, except in one test whose scanner moves the plate.
+//! The results that the press accepted are compared with the host's record and with the known plate.
 
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::net::TcpStream;
@@ -126,7 +128,8 @@ fn document(record: &Json) -> Json {
     serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap()
 }
 
-/// Asserts that each result accepted by the press is the recorded one; its register of gap.max is in hundredths of a millimetre.
+/// Asserts that each result accepted by the press is the recorded one; its register of gap.max is in hundredths of a
+/// millimetre.
 #[track_caller]
 fn assert_registers(history: &[Json], taken: &[Json]) {
     assert_eq!(history.len(), taken.len());
@@ -243,8 +246,8 @@ fn a_smaller_scan_window_has_fewer_columns() {
 #[test]
 fn a_plate_outside_its_window_is_scanned_again_once() {
     let folder = tempfile::tempdir().unwrap();
-    // From the third scan on the plate is displaced by one metre along its v, half out of its window; from the sixth on by two
-    // metres the other way, wholly out of its window.
+    // From the third scan on the plate is displaced by one metre along its v, half out of its window; from the sixth on
+    // by two metres the other way, wholly out of its window.
     let scans = AtomicU32::new(0);
     let moving = move || {
         let mut state = crate::stream::plate();

@@ -1,6 +1,7 @@
-//! Optical faults and errors of the instrument and of its pose: a scan by the simulator's bridge, transferred over a socket by the driver
-//! library, is measured and compared with the known plate. The result is within the bounds of the table, or the plate is refused with
-//! one sentence.
+//! Optical faults and errors of the instrument and of its pose, with a bound for each.
+//!
+//! A scan by the simulator's bridge, transferred over a socket by the driver library, is measured and compared with the
+//! known plate. The result is within the bounds of the table, or the plate is refused with one sentence.
 //!
 //! | fault | test | bounds: largest error of the corners, rms of the mid-surface along its normal (9 x 9 grid) |
 //! |---|---|---|
@@ -94,7 +95,7 @@ fn measure(scene: Scene) -> Result<Found, NotMeasured> {
     let surface = &measured.measurement.surface;
     let mut squares = 0.0;
     for k in 0..81 {
-        // 5 % from the edges, whose errors the corners show.
+        // 5 % from the edges, whose errors are visible in the corners.
         let share = |i: usize| 0.05 + 0.9 * i as f64 / 8.0;
         let (u, v) = (share(k % 9) * width, share(k / 9) * height);
         squares += (surface.point(u, v) - truth.mid(u, v)).dot(&truth.normal(u, v)).powi(2);
@@ -147,7 +148,7 @@ fn mixed_pixels_at_the_edges() {
     survives(0.8, 0.01, Scene { instrument, ..Scene::default() });
 }
 
-/// A plate raised towards the scanner, so that a specular lobe of this half width lies across its upper edge.
+/// Returns a plate raised towards the scanner, so that a specular lobe of this half width lies across its upper edge.
 fn in_specular_reflection(lobe_deg: f64) -> Scene {
     let pose = Pose { centre_mm: [6_000.0, 0.0, -1_800.0], pitch_deg: -70.0, ..Pose::default() };
     // Region of interest: the bed, as large as the plate.
@@ -207,7 +208,8 @@ fn warm_up_columns_are_left_out() {
     survives(0.8, 0.01, Scene { instrument, ..Scene::default() });
 }
 
-/// Both faces scan a part of the plate; the back face has its own collimation error and is displaced by 1.1 mm; three warm-up columns.
+/// Returns a scene in which both faces scan a part of the plate; the back face has its own collimation error and is
+/// displaced by 1.1 mm; three warm-up columns.
 fn seam(seam_deg: f64, clockwise: bool) -> Scene {
     let faces = Faces { seam_column: 0, collimation: 50e-6, trunnion: 25e-6, moved: [0.0, 0.5e-3, 1e-3] };
     let scene = Scene::default();

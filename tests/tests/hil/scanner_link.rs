@@ -1,6 +1,8 @@
-//! Faults of link, bridge and scanner: the driver library `faro-stream`, loaded as by the host, against the simulator's bridge on a
-//! socket. The two share no code. A scan either survives, which means that its lattice equals that of an undisturbed scan bit for bit, or
-//! fails before its deadline with one sentence that states the cause.
+//! Faults of link, bridge and scanner: the driver library `faro-stream`, loaded as by the host, against the simulator's
+//! bridge on a socket.
+//!
+//! Driver and bridge share no code. A scan either survives, which means that its lattice equals that of an undisturbed
+//! scan bit for bit, or fails before its deadline with one sentence that states the cause.
 //!
 //! | fault | test | outcome |
 //! |---|---|---|
@@ -108,7 +110,7 @@ fn a_scan_is_resumed_after_many_cuts() {
 
 #[test]
 fn a_scan_lost_by_a_restarted_bridge_fails() {
-    // A scan that the bridge does not know cannot be resumed, and is not repeated under the same identity.
+    // A scan that the restarted bridge no longer has cannot be resumed, and is not repeated under the same identity.
     fails(&["bridge-killed=12"], "the bridge refuses (gone): scan ");
 }
 
@@ -311,8 +313,8 @@ fn a_scanner_moved_during_the_scan_is_reported() {
 fn battery_temperature_and_contamination_are_warnings() {
     for fault in ["battery-low", "temperature", "contamination"] {
         survives(&[fault]);
-        // The host learns it as a state of the instrument too.
-        // A bridge tells it once a second: the scan takes longer.
+        // The host receives it as a state of the instrument too. A bridge reports it once a second, so the scan takes
+        // longer.
         let bridge = start(&[fault], BridgeConfig { time_scale: 0.1, ..BridgeConfig::default() }, head());
         let scanner = driver(bridge.address(), COARSE);
         scan(&scanner, Some(&WINDOW), LIMIT).unwrap();

@@ -1,5 +1,7 @@
-//! Recording and replay of frames, direction of rotation, two faces, memory during the scan of a whole dome, scan window: the driver library
-//! `faro-stream`, loaded as by the host, against the simulator's bridge.
+//! Recording and replay of frames, direction of rotation, two faces, memory during the scan of a whole dome, scan
+//! window.
+//!
+//! The driver library `faro-stream` is loaded as by the host and runs against the simulator's bridge.
 
 use std::f64::consts::PI;
 use std::io::{BufRead as _, BufReader};

@@ -1,4 +1,5 @@
-//! The pages of the real `platen run` beside the simulated press. A browser reads them in `tests/peers/screen`.
+//! Tests of the pages of the real `platen run` beside the simulated press. In `tests/peers/screen` a browser reads
+//! them.
 
 use std::io::{Read as _, Write as _};
 use std::net::TcpStream;
@@ -8,7 +9,7 @@ use serde_json::Value as Json;
 
 use crate::cell::{Host, Press, plant, until};
 
-/// A plant with pages on a port of the system's choice.
+/// Writes a plant with pages on a port chosen by the system.
 fn plant_with_pages(folder: &Path, press: &Press) -> std::path::PathBuf {
     let path = plant(folder, &press.modbus, &format!("cell = \"{}\"", press.plate));
     let text = std::fs::read_to_string(&path).unwrap();
@@ -16,7 +17,7 @@ fn plant_with_pages(folder: &Path, press: &Press) -> std::path::PathBuf {
     path
 }
 
-/// Address of a host's pages: `127.0.0.1:PORT`.
+/// Returns the address of a host's pages: `127.0.0.1:PORT`.
 pub(crate) fn address(host: &Host) -> String {
     until("the address of the pages", || {
         let status = host.status()?;
@@ -119,7 +120,8 @@ fn after_a_restart_no_result_is_shown_without_its_stroke() {
     until("ready", || (state(&again)["press"]["ready"] == true).then_some(()));
     let now = state(&again);
     assert_ne!(now["boot"], boot);
-    // Acknowledged before the kill: the stroke is over, and nothing of it is shown. Never a result without its stroke.
+    // Acknowledged before the kill: the stroke has ended, and nothing of it is shown. A result is never shown without
+    // its stroke.
     assert!(now["result"].is_null() || now["stroke"]["number"] == 1, "{now:#}");
     assert_eq!(host.stop(), Some(0), "{}", host.log());
 }

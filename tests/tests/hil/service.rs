@@ -1,4 +1,4 @@
-//! The host as a service: what it tells systemd, a backup taken while it runs, and the record restored from it.
+//! Host as a service: its notifications to systemd, a backup taken while it runs, and the record restored from it.
 
 use std::os::unix::net::UnixDatagram;
 use std::time::Duration;
@@ -8,7 +8,7 @@ use serde_json::Value as Json;
 
 use crate::cell::{Host, Press, assert_clean, plant, until};
 
-/// Standard output of the program as JSON, which must succeed.
+/// Returns the standard output of the program as JSON; the program must succeed.
 #[track_caller]
 fn json(arguments: &[&str]) -> Json {
     let output = program("platen").args(arguments).arg("--json").output().unwrap();
@@ -16,7 +16,7 @@ fn json(arguments: &[&str]) -> Json {
     serde_json::from_slice(&output.stdout).unwrap()
 }
 
-/// Its error line, where it must fail with this exit code.
+/// Returns its error line; the program must fail with this exit code.
 #[track_caller]
 fn refused(arguments: &[&str], code: i32) -> String {
     let output = program("platen").args(arguments).output().unwrap();
@@ -46,7 +46,7 @@ fn systemd_hears_ready_then_the_cycle_then_stopping() {
         fed += now.matches("WATCHDOG=1").count();
         said += &now;
     }
-    // A host that does not run feeds nothing: no ticker beside the cycle.
+    // A stopped host does not reset the watchdog: there is no timer beside the cycle.
     host.signal("STOP");
     socket.set_nonblocking(true).unwrap();
     while socket.recv(&mut [0; 4096]).is_ok() {}
@@ -66,7 +66,7 @@ fn systemd_hears_ready_then_the_cycle_then_stopping() {
     assert!(last.contains("STOPPING=1"), "{last}");
 }
 
-/// A forwarder of a plant, ended with the test.
+/// Forwarder of a plant, ended with the test.
 struct Forwarder(std::process::Child);
 
 impl Drop for Forwarder {
@@ -76,13 +76,14 @@ impl Drop for Forwarder {
     }
 }
 
-/// Nobody listens: the host says so, nothing is lost, one forwarder has the cursors, and an alarm is an event of the record.
+/// The server is missing: the host reports it, nothing is lost, one forwarder has the cursors, and an alarm is an event
+/// of the record.
 #[test]
 fn a_sink_that_is_away_is_told_by_the_host_and_forgotten_by_none() {
     let folder = tempfile::tempdir().unwrap();
     let mut press = Press::start(folder.path(), "strokes = 9\nautomatic = false\nbaseline = false");
     let plant = plant(folder.path(), &press.modbus, &format!("cell = \"{}\"", press.plate));
-    // A port that was free a moment ago, and that nobody takes while it is held without listening.
+    // A port that was free a moment ago, and cannot be used by another program while it is bound without listening.
     let held = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
     let port = held.local_addr().unwrap().port();
     drop(held);
@@ -116,7 +117,7 @@ fn a_sink_that_is_away_is_told_by_the_host_and_forgotten_by_none() {
     assert!(ended.unwrap().success());
     assert_eq!(until("its end", || forwarder.0.try_wait().unwrap()).code(), Some(0));
 
-    // The press goes away: the alarm is on record, where the forwarder finds it.
+    // The press ends: the alarm is recorded, where the forwarder finds it.
     drop(press);
     let file = folder.path().join("results/history.sqlite");
     let noted = until("the alarm on record", || {
@@ -168,13 +169,13 @@ fn a_record_goes_on_from_a_backup_taken_while_its_host_ran() {
     let now = Host::history(&plant);
     assert_eq!((now.len(), &now[2]["run_id"]), (3, &lost[2]["run_id"]), "the run id comes again");
     assert_ne!(now[2]["key"], lost[2]["key"]);
-    // Its documents are where the record says: a report of the plate can be made of them.
+    // Its documents are at the places in the record: a report of the plate can be made from them.
     json(&["history", "report", file, "1"]);
     let stats = press.stats();
     assert_clean(&stats, &host.log());
     assert_eq!(stats["owners"], restored["owners"][0], "the press saw both owner numbers");
 
-    // A file of the backup that was damaged is named.
+    // A damaged file of the backup is reported.
     let document = backup.join("run-000001/result.json");
     let text = std::fs::read_to_string(&document).unwrap();
     std::fs::remove_file(&document).unwrap();
@@ -195,7 +196,7 @@ fn a_host_asked_to_stop_waits_for_the_end_of_the_plate() {
     until("stroke 1 acknowledged", || Host::history(&plant)[0]["ack"].is_string().then_some(()));
     assert_eq!(json(&["stop", file, "--when-idle"])["when_idle"], true);
     until("the request in the state", || (host.status()?["status"]["stop_asked"] == true).then_some(()));
-    // The plate goes on, and so does the host.
+    // The plate continues, and so does the host.
     stroke(&mut press, 2);
     until("stroke 2 acknowledged", || Host::history(&plant)[1]["ack"].is_string().then_some(()));
     assert_eq!(host.status().unwrap()["running"], true, "{}", host.log());

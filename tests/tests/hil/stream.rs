@@ -1,4 +1,4 @@
-//! The reference bridge of the simulator, and the real driver library loaded by the host's loader, over a real socket.
+//! Reference bridge of the simulator, and the real driver library loaded by the host's loader, over a real socket.
 
 use std::net::SocketAddr;
 use std::time::Duration;
@@ -10,21 +10,21 @@ use platen_scan::{Lattice, ScanEnd, Window};
 use platen_sim_plate::{PlateState, Shape};
 use platen_sim_scanner::stream::{Bridge, BridgeConfig, RayCastHead};
 
-/// Longest scan that a test waits for; nothing here takes so long unless it is broken.
+/// Longest scan for which a test waits; only a fault takes this long.
 pub(crate) const LIMIT: Duration = Duration::from_secs(60);
 
-/// A bent plate of the size of recipe 9.
+/// Returns a bent plate of the size of recipe 9.
 pub(crate) fn plate() -> PlateState {
     let shape = Shape::Cylinder { radius_mm: 9018.0, axis_deg: 90.0 };
     PlateState { shape, ..PlateState::flat(3000.0, 2500.0, 36.0) }
 }
 
-/// A scanner before that plate.
+/// Returns a scanner before that plate.
 pub(crate) fn head() -> RayCastHead {
     RayCastHead { threads: 2, ..RayCastHead::new(Box::new(|| Ok(Some(plate())))) }
 }
 
-/// A bridge with these faults, its seed fixed.
+/// Returns a bridge with these faults and a fixed seed.
 pub(crate) fn bridge(faults: &[&str]) -> Bridge {
     start(faults, BridgeConfig::default(), head())
 }
@@ -34,7 +34,7 @@ pub(crate) fn start(faults: &[&str], config: BridgeConfig, head: RayCastHead) ->
     Bridge::start(BridgeConfig { faults, ..config }, Box::new(head)).unwrap()
 }
 
-/// The driver as a plant file asks for it; `options` are further lines.
+/// Returns the driver as specified in a plant file; `options` are further lines.
 pub(crate) fn driver(address: SocketAddr, options: &str) -> Scanner {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("plant.toml");
@@ -52,7 +52,7 @@ pub(crate) const COARSE: &str = "divisor = 32\nrate_kpts = 122";
 pub(crate) const WINDOW: Window =
     Window { azimuth_start: -0.075, azimuth_width: 0.15, elevation_min: -0.65, elevation_max: -0.5 };
 
-/// One scan, every column in its place, or why there is none.
+/// Returns one scan with every column in its place, or the reason why there is none.
 pub(crate) fn scan(
     scanner: &Scanner,
     window: Option<&Window>,
@@ -66,7 +66,7 @@ pub(crate) fn scan(
     Ok((lattice, scan.finish()?))
 }
 
-/// Everything that a scan says, so that two can be compared to the last bit.
+/// Returns the whole content of a scan, so that two scans can be compared to the last bit.
 pub(crate) fn cells(lattice: &Lattice) -> Vec<(Option<u64>, Option<[u64; 2]>, u16)> {
     let direction = |cell| lattice.direction(cell).map(|d| [d.azimuth.to_bits(), d.elevation.to_bits()]);
     (0..lattice.n_columns() * lattice.n_rows())

@@ -1,4 +1,4 @@
-//! `platen press` and `platen status` against a simulated press in a process of its own.
+//! Tests of `platen press` and `platen status` against a simulated press in a process of its own.
 
 use std::path::Path;
 use std::process::{Command, Output};
@@ -6,7 +6,7 @@ use std::process::{Command, Output};
 use crate::cell::{Host, Press, plant, until};
 use serde_json::Value as Json;
 
-/// `platen press VERB PLANT ...`.
+/// Runs `platen press VERB PLANT ...`.
 fn verb(verb: &str, plant: &Path, rest: &[&str]) -> Output {
     platen_tests::program("platen").args(["press", verb]).arg(plant).args(rest).output().unwrap()
 }
@@ -17,7 +17,7 @@ fn json(output: &Output) -> Json {
         .unwrap_or_else(|e| panic!("{e}: {text}\n{}", String::from_utf8_lossy(&output.stderr)))
 }
 
-/// An idle press and a plant file for it.
+/// Starts an idle press and writes a plant file for it.
 fn idle() -> (tempfile::TempDir, Press, std::path::PathBuf) {
     let folder = tempfile::tempdir().unwrap();
     let press = Press::start(folder.path(), "automatic = false");
@@ -83,7 +83,7 @@ fn the_readers_find_what_stands_there_and_never_write() {
     let range = json(&verb("dump", &plant, &["--range", "4..8", "--json"]));
     assert_eq!(range["words"][3], serde_json::json!([7, 3]), "register 7 is the press's number: {range}");
 
-    // part_id 1 stands in the registers 8 and 9, high word first.
+    // The value of part_id is 1, in the registers 8 and 9, high word first.
     let probe = verb("probe-order", &plant, &["--at", "8", "--expect", "1"]);
     let text = String::from_utf8_lossy(&probe.stdout).into_owned();
     assert_eq!(probe.status.code(), Some(0), "{text}");
@@ -132,7 +132,7 @@ fn a_guided_handshake_keeps_every_step() {
     }
     let stats = press.stats();
     crate::cell::assert_clean(&stats, "");
-    // The bit `simulated` stood with every result.
+    // The bit `simulated` was set with every result.
     for taken in stats["taken"].as_array().unwrap() {
         assert_ne!(taken["words"][2].as_u64().unwrap() & 1 << 9, 0, "{taken}");
     }
@@ -185,7 +185,7 @@ fn soak_on_each_line() {
             "{line}: {run:#}"
         );
     };
-    // Each has a press of its own, and mostly waits.
+    // Each has a press of its own, and is idle most of the time.
     std::thread::scope(|scope| {
         for (line, strokes, wanted) in [("tcp", "60", 100), ("rtu-over-tcp", "12", 12), ("rtu", "12", 12)] {
             scope.spawn(move || soak(line, strokes, wanted));

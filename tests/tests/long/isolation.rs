@@ -1,4 +1,4 @@
-//! Cost of a plugin in a process of its own: its start, a call, against a thread of the host.
+//! Cost of a plugin in a process of its own, compared with a thread of the host: its start, and a call.
 
 use std::time::{Duration, Instant};
 

@@ -1,8 +1,8 @@
-//! The simulator against independent plates: the same scenes, simulated here with many seeds, are measured as accurately
-//! as the samples are.
+//! Simulator against independent plates: the same scenes, simulated here with many seeds, are measured as accurately as
+//! the samples.
 //!
-//! A sample is one draw of noise and of where the lattice falls on the edges, so it is held against the range of many
-//! draws: its figures must lie within that range, widened by a factor on both sides.
+//! A sample is one random draw of the noise and of the position of the lattice on the edges. It is therefore compared
+//! with the range of many draws: its figures must lie within that range, widened by a factor on both sides.
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -23,14 +23,14 @@ type Vec3 = Vector3<f64>;
 
 /// Scans of each scene by our simulator.
 const SEEDS: u64 = 10;
-/// The plate moves by up to this much from seed to seed, millimetres: more than a lattice step.
+/// Largest shift of the plate from seed to seed, millimetres: more than a lattice step.
 const SHIFT_MM: f64 = 15.0;
 const LIMIT: Duration = Duration::from_secs(120);
 
 struct Sample {
     folder: PathBuf,
     truth: Json,
-    /// The simulator's own words for the shape.
+    /// The simulator's description of the shape.
     shape: &'static str,
 }
 
@@ -74,7 +74,7 @@ impl Sample {
         (0..n).map(marker).collect()
     }
 
-    /// The simulator's description of the same plate, moved a little.
+    /// Returns the simulator's description of the same plate, moved a little.
     fn description(&self, seed: u64) -> String {
         let mut random = fastrand::Rng::with_seed(seed);
         let rotation = Matrix3::from_fn(|i, k| self.number(&format!("/pose/R/{i}/{k}")));
@@ -91,7 +91,7 @@ impl Sample {
     }
 }
 
-/// The product's own pipeline, from a driver to the measured plate.
+/// Pipeline of the product, from a driver to the measured plate.
 struct Lab {
     catalogue: Catalogue,
     rig: Pipeline,
@@ -112,7 +112,7 @@ impl Lab {
         stroke::measure_scanned(&mut self.rig, &scanned, spec, None, Baseline::None).unwrap()
     }
 
-    /// Corners rms and markers mean of the sample itself, millimetres.
+    /// Returns corners (rms) and markers (mean) of the sample itself, millimetres.
     fn of_sample(&mut self, sample: &Sample) -> [f64; 2] {
         let file = std::path::absolute(sample.folder.join("scan.e57")).unwrap();
         let measured = self.measure("faro-file", vec![("file", Value::Path(file))], &sample.spec());
@@ -124,7 +124,7 @@ impl Lab {
         [1000.0 * rms(corners), 1000.0 * errors.sum::<f64>() / markers.len() as f64]
     }
 
-    /// The same of our scan of the same scene.
+    /// Returns the same figures for our scan of the same scene.
     fn of_ours(&mut self, sample: &Sample, folder: &Path, seed: u64) -> [f64; 2] {
         let (plate, truth) = (folder.join("plate.toml"), folder.join("truth.json"));
         std::fs::write(&plate, sample.description(seed)).unwrap();
@@ -144,8 +144,8 @@ impl Lab {
     }
 }
 
-/// The range is widened by `factor`. Figures of markers up to `no_judge_mm` are the sample's own doubt about its truth
-/// and judge nothing.
+/// Checks a scene; the range is widened by `factor`. Figures of markers up to `no_judge_mm` are within the uncertainty
+/// of the sample's own truth and are not judged.
 fn check(name: &str, shape: &'static str, factor: f64, no_judge_mm: f64) {
     let samples: Vec<Sample> = samples::each(&format!("plates/{name}"))
         .into_iter()
@@ -184,8 +184,9 @@ fn p1_cylinder() {
 
 #[test]
 fn p2_sphere() {
-    // The samples' page: its map follows one material law, and below 0.2 mm it is no judge of others.
-    // Its corners (0.25 mm) are farther off than ours (0.10 to 0.15 mm), within what is stated for them (0.36 to 0.61 mm).
+    // According to the samples' document its map follows one material law, and below 0.2 mm it cannot be used to judge
+    // others. Its corners (0.25 mm) are farther off than ours (0.10 to 0.15 mm), within the uncertainty stated for them
+    // (0.36 to 0.61 mm).
     check("p2_sphere", "shape = \"sphere\"\nradius_mm = 11000.0", 1.75, 0.2);
 }
 

@@ -1,12 +1,12 @@
-//! Memory and growth from a table scan to a full dome, columns as they come.
+//! Memory and its growth from a table scan to a full dome, with streamed columns.
 //!
 //! `PLATEN_DOME` adds the 44 million cells of a full dome, which take a minute to cast.
 
 use serde_json::Value as Json;
 
-/// The whole process may have this many times the raw lattice, ...
+/// Memory limit of the whole process: this many times the raw lattice, ...
 const LATTICES: f64 = 3.0;
-/// ... and what any measurement needs: program, libraries, mesh, factor. Megabytes.
+/// ... plus the memory that any measurement needs: program, libraries, mesh, factor. Megabytes.
 const BASE_MB: f64 = 64.0;
 
 fn number(row: &Json, name: &str) -> f64 {
@@ -49,11 +49,11 @@ fn memory_is_bounded_by_the_lattice_and_for_a_dome_by_the_plate() {
         assert!(peak < LATTICES * raw + BASE_MB, "{row}");
     }
     assert!(rows.len() >= 2);
-    // Four times the samples on the plate from four times the cells: nothing is thinned out on the way.
+    // Four times the cells give four times the samples on the plate: no samples are dropped.
     let growth = number(&rows[1], "plate_points") / number(&rows[0], "plate_points");
     assert!((growth - 4.0).abs() < 0.1, "{growth}");
     if let Some(dome) = rows.get(2) {
-        // The same plate at the same step: what is round it is not kept.
+        // The same plate at the same step: its surroundings are not kept.
         assert!(number(dome, "peak_mb") < 0.5 * number(dome, "raw_lattice_mb"), "{dome}");
     }
 }

@@ -1,12 +1,12 @@
-//! Accuracy over many simulated scans: the figures of `platen bench accuracy`, held against their bounds.
+//! Accuracy over many simulated scans: the figures of `platen bench accuracy`, compared with their bounds.
 //!
-//! `PLATEN_SEEDS` sets how many scans of each plate are measured.
+//! `PLATEN_SEEDS` sets the number of scans of each plate.
 
 use serde_json::Value as Json;
 
-/// Scans of each plate, unless `PLATEN_SEEDS` says otherwise.
+/// Number of scans of each plate without `PLATEN_SEEDS`.
 const SEEDS: &str = "2";
-/// Range noise at 10 m, millimetres: with the filters of a scanner, and beyond its full rate.
+/// Range noise at 10 m, millimetres: with the filters of a scanner, and above its noise at full rate.
 const NOISE_MM: [f64; 2] = [0.8, 2.0];
 
 const DEVELOPABLE: &[&str] = &["cylinder", "cone", "bands", "half-bent"];
@@ -15,7 +15,8 @@ const CONSTANT: &[&str] = &["cylinder", "cone", "sphere", "torus"];
 const NARROW: &[&str] = &["bands", "half-bent"];
 const ALL: &[&str] = &["cylinder", "cone", "bands", "half-bent", "sphere", "torus"];
 
-/// Figure, plates, largest mean over the seeds at each noise: about twice what 4 and 50 seeds give on the worst of the plates.
+/// Figure, plates, and largest mean over the seeds at each noise: about twice the values of the worst plate with 4 and
+/// 50 seeds.
 const BOUNDS: &[(&str, &[&str], [f64; 2])] = &[
     // Found: 0.31 and 0.43 (torus, 50 seeds).
     ("corners_rms_mm", ALL, [0.5, 0.86]),
@@ -39,11 +40,11 @@ const BOUNDS: &[(&str, &[&str], [f64; 2])] = &[
     ("curvature_rms_per_m", NARROW, [9e-3, 0.0155]),
 ];
 
-/// Largest corner figure of any one scan of a plate of constant curvature, at any noise: an edge at a lesser maximum of its
-/// likelihood is 1 mm off, which a mean over seeds hides.
+/// Largest corner figure of any one scan of a plate of constant curvature, at any noise: an edge at a lesser maximum of
+/// its likelihood is 1 mm off, which is not visible in a mean over seeds.
 const WORST_CORNERS_MM: f64 = 0.75;
 
-/// Figure of a stroke, its largest means likewise.
+/// Figure of a stroke, with its largest means as above.
 const STROKES: &[(&str, [f64; 2])] = &[
     // Found: 0.025 and 0.059.
     ("displacement_normal_rms_mm", [0.05, 0.1]),
@@ -77,7 +78,7 @@ fn seeds() -> String {
     std::env::var("PLATEN_SEEDS").unwrap_or_else(|_| SEEDS.to_owned())
 }
 
-/// Says one figure and, where it is too large, adds it to the failures.
+/// Prints one figure and, if it is too large, adds it to the failures.
 fn hold(failures: &mut Vec<String>, of: &str, noise_mm: f64, name: &str, row: &Json, bound: f64) {
     let [mean, worst] = ["mean", "worst"].map(|what| number(row, &format!("/{name}/{what}")));
     println!("| {of} | {noise_mm} | {name} | {mean:.5} | {worst:.5} | {bound} |");
@@ -131,7 +132,7 @@ fn plates_and_strokes_are_measured_within_the_bounds() {
         hold(&mut failures, "null pair", noise_mm, "false_change_share", pair, FALSE_CHANGE);
     }
 
-    // What the paper's harmonic map gets wrong by itself shows, or the comparison would not be fair.
+    // The error of the paper's harmonic map must be visible, otherwise the comparison would not be fair.
     for plate in DOUBLY_CURVED {
         let [elastic, harmonic] = ["elastic", "harmonic"]
             .map(|flattening| number(row(plate, NOISE_MM[0], flattening), "/markers_mean_mm/mean"));
