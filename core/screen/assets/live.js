@@ -32,7 +32,7 @@ function changed(element) {
   element.fading = setTimeout(() => element.removeAttribute('class'), 3000);
 }
 
-// Removes everything that was heard, and says why.
+// Removes everything that was received, and shows the reason.
 function silence(reason, words, remedy) {
   if (stale === reason) return;
   stale = reason;
@@ -88,7 +88,7 @@ function watch() {
   if (performance.now() - heard > SILENCE_MS) silence('lost', told.lost, told.lostRemedy);
 }
 
-// A hidden page holds no connection, and knows nothing when it comes back.
+// A hidden page has no connection, and shows nothing when it comes back.
 function shown() {
   if (document.hidden) close();
   else {
