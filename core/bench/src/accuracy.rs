@@ -1,7 +1,7 @@
 //! Errors of a measurement against the true shape of a simulated plate.
 //!
-//! The truth is the document that the simulated scanner writes beside a scan (driver option `truth_file`, `platen-sim
-//! scanner --truth`). It does not depend on the measurement, and the measurement does not read it.
+//! The truth is the document that the simulated scanner writes beside a scan (driver option `truth_file`,
+//! `platen-sim scanner --truth`). It does not depend on the measurement, and the measurement does not read it.
 
 use std::path::Path;
 
