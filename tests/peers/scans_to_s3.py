@@ -22,7 +22,7 @@ logging.getLogger("werkzeug").setLevel(logging.ERROR)
 UNIT = Path(__file__).resolve().parents[2] / "config/scans/platen-scans.service"
 BUCKET = "platen-scans"
 FOLDER = "/var/lib/platen/store"
-# What the unit's comment says that the user needs.
+# Permissions that the user needs according to the unit's comment.
 RIGHTS = {"Version": "2012-10-17", "Statement": [{"Effect": "Allow", "Action": ["s3:ListBucket", "s3:GetObject", "s3:PutObject"],
                                                   "Resource": [f"arn:aws:s3:::{BUCKET}", f"arn:aws:s3:::{BUCKET}/*"]}]}
 

@@ -1,8 +1,8 @@
 //! Tests of one scene in every format and order: the same cells within the quantum of each encoding, and the same
 //! verdict.
 //!
-//! The files come from the simulator's own writers and are read by the real driver library. Verdicts come from `platen
-//! measure`. The output of `platen convert` must give the same cells again.
+//! The files come from the simulator's own writers and are read by the real driver library. Verdicts come from
+//! `platen measure`. The output of `platen convert` must give the same cells again.
 
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
