@@ -1,8 +1,9 @@
 //! Record of strokes and plates, and the press side's journal, in one SQLite database per host.
 //!
 //! [`History`] is the only writer. It holds an exclusive lock file for its lifetime, and each method that records a
-//! step of a stroke returns only when the step would survive a power cut: SQLite's write-ahead log with `synchronous =
-//! FULL`. [`Archive`] reads, from any process and at any time, also while the host runs; `platen history` uses it.
+//! step of a stroke returns only when the step would survive a power cut: SQLite's write-ahead log with
+//! `synchronous = FULL`. [`Archive`] reads, from any process and at any time, also while the host runs;
+//! `platen history` uses it.
 //!
 //! A stroke passes four stages, [`Stage`](platen_model::Stage); the time of each is recorded. [`History::record`] takes
 //! the steps in order and refuses a step that does not follow from the recorded ones. A repeated step changes nothing,

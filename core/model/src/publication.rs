@@ -4,8 +4,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::{Code, Figures, StrokeKey, Timestamp, Verdict};
 
-/// Judgement of a stroke for the press. In documents it is `"pass"`, `"cannot_tell"`, `"fail"` or `{"not_measured":
-/// code}`.
+/// Judgement of a stroke for the press. In documents it is `"pass"`, `"cannot_tell"`, `"fail"` or
+/// `{"not_measured": code}`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum Judgement {

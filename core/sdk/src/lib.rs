@@ -57,8 +57,8 @@
 //! # Errors, panics, log
 //!
 //! An [`Error`] consists of a kind, a sentence (place and failure) and a hint (remedy). Panics are caught in the
-//! exported functions and become errors of kind [`ErrorKind::Internal`]; the crate must be built with `panic =
-//! "unwind"`. Events of `tracing` are forwarded to the host's log with the id of the job.
+//! exported functions and become errors of kind [`ErrorKind::Internal`]; the crate must be built with
+//! `panic = "unwind"`. Events of `tracing` are forwarded to the host's log with the id of the job.
 //!
 //! # Threads and time
 //!

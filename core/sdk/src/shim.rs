@@ -489,8 +489,8 @@ unsafe extern "C" fn scan_seconds<P: Plugin>(
     seconds
 }
 
-/// Exports the plugins of a library: `export!(scanner Type);`, `export!(flattening Type);`, `export!(comparison
-/// Type);`, or several: `export!(flattening One, flattening Two);`.
+/// Exports the plugins of a library: `export!(scanner Type);`, `export!(flattening Type);`,
+/// `export!(comparison Type);`, or several: `export!(flattening One, flattening Two);`.
 #[macro_export]
 macro_rules! export {
     ($($kind:ident $plugin:ty),+ $(,)?) => {
