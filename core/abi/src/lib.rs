@@ -1,5 +1,6 @@
-//! C boundary between platen and its plugins: function tables, descriptors and payload headers. `include/platen.h` is
-//! the same boundary in C.
+//! C boundary between platen and its plugins: function tables, descriptors and payload headers.
+//!
+//! `include/platen.h` is the same boundary in C.
 //!
 //! A plugin is a shared library that exports one data symbol, [`ENTRY_SYMBOL`], of type [`Entry`]. The host reaches
 //! everything else through it.

@@ -1,5 +1,6 @@
-//! Conformance tests of a scan bridge over TCP, for `platen bridge check`. They test the scan bridge protocol 1.0 and
-//! are written from its document alone (`drivers/faro-stream/PROTOCOL.md`).
+//! Conformance tests of a scan bridge over TCP, for `platen bridge check`.
+//!
+//! They test the scan bridge protocol 1.0 and are written from its document alone (`drivers/faro-stream/PROTOCOL.md`).
 //!
 //! The tests act as a driver of their own. Each test opens new connections. Tests that scan use the given settings, and
 //! the scanner turns. A test that the answers of the bridge make impossible (for example, the scan has already ended)

@@ -1,4 +1,6 @@
-//! Change log of the record, in the order of its commits, for programs that forward it. It exists from format 1.1 on.
+//! Change log of the record, in the order of its commits, for programs that forward it.
+//!
+//! It exists from format 1.1 on.
 
 use rusqlite::Row;
 

@@ -1,5 +1,6 @@
-//! Lock file of a history, which allows one writer at a time. It contains the holder's name; the operating system
-//! releases it when the process ends.
+//! Lock file of a history, which allows one writer at a time.
+//!
+//! It contains the holder's name; the operating system releases it when the process ends.
 
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{Read, Write};

@@ -1,5 +1,6 @@
-//! Crash test: `kill -9` at every point of a stroke. No stroke may be scanned twice, lost without a report, or
-//! published with two results.
+//! Crash test: `kill -9` at every point of a stroke.
+//!
+//! No stroke may be scanned twice, lost without a report, or published with two results.
 //!
 //! The test acts as the press. The host is the same test binary as a child process, connected by pipes. It is killed at
 //! each named point while it is paused there, then at random moments.

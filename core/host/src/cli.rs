@@ -1,4 +1,6 @@
-//! Command line of `platen`, with one module for each command (verb). Results go to stdout, the log to stderr.
+//! Command line of `platen`, with one module for each command (verb).
+//!
+//! Results go to stdout, the log to stderr.
 //!
 //! Exit codes: 0 done, 1 failed, 2 bad usage or plant file. `--json` prints the result of any verb as one JSON
 //! document.

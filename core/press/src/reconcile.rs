@@ -1,4 +1,6 @@
-//! Reconciliation of the host's registers: drives them to their target values. Every write can be repeated safely.
+//! Reconciliation of the host's registers: drives them to their target values.
+//!
+//! Every write can be repeated safely.
 //!
 //! The desired words are compared with the known actual words (echoed or read back); differences are written until they
 //! are echoed. Order: data with the old commit word, the commit word, the status; a result is therefore complete before

@@ -1,5 +1,6 @@
-//! Output of a measurement: documents, pictures, meshes, tables and the report of a plate. Overview:
-//! `core/report/README.md`.
+//! Output of a measurement: documents, pictures, meshes, tables and the report of a plate.
+//!
+//! Overview: `core/report/README.md`.
 //!
 //! | module | contents |
 //! |---|---|

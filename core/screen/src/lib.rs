@@ -1,5 +1,7 @@
 //! Browser pages of a running host, over HTTP/1.1: operator's screen, strokes of a plate, comparison of two strokes,
-//! engineer's page, plate in 3D. Overview: `core/screen/README.md`.
+//! engineer's page, plate in 3D.
+//!
+//! Overview: `core/screen/README.md`.
 //!
 //! | module | contents |
 //! |---|---|

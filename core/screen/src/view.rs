@@ -1,5 +1,6 @@
-//! View settings of a page, from the query of its address: `/?lang=ja&units=in&turn=drawing&theme=dark`. The browser
-//! stores nothing.
+//! View settings of a page, from the query of its address: `/?lang=ja&units=in&turn=drawing&theme=dark`.
+//!
+//! The browser stores nothing.
 
 use platen_model::Language;
 use platen_report::picture::{self, Turn, Units};

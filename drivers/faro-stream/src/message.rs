@@ -1,5 +1,6 @@
-//! JSON messages of the protocol, sections 2 to 7 of `PROTOCOL.md`. A member that a bridge may omit is an `Option` or
-//! has a default.
+//! JSON messages of the protocol, sections 2 to 7 of `PROTOCOL.md`.
+//!
+//! A member that a bridge may omit is an `Option` or has a default.
 
 use serde::{Deserialize, Serialize};
 

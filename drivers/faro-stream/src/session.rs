@@ -1,5 +1,6 @@
-//! Session: the state machine of the protocol for one scan. It is a pure function of received frames, without socket or
-//! clock.
+//! Session: the state machine of the protocol for one scan.
+//!
+//! It is a pure function of received frames, without socket or clock.
 //!
 //! ```text
 //! connected -> Hello; Capabilities -> Start, or Resume when the scan is known; ScanBegin; Columns;

@@ -1,5 +1,6 @@
-//! Flattening `elastic`: the chart of least elastic energy of the membrane on the known outline. It is the default
-//! flattening.
+//! Flattening `elastic`: the chart of least elastic energy of the membrane on the known outline.
+//!
+//! It is the default flattening.
 //!
 //! A plate that is pressed to a sphere or a torus stretches and shrinks in its own plane. This flattening finds the
 //! positions (u, v) at which the plate, deformed from its flat shape onto the measured mid-surface, stores the least

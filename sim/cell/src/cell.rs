@@ -1,5 +1,7 @@
-//! Command `cell`: a press and a scanner on one plate. The scanner serves scans over TCP, or writes a file into a
-//! folder at each stroke, as an export script of a real scanner does.
+//! Command `cell`: a press and a scanner on one plate.
+//!
+//! The scanner serves scans over TCP, or writes a file into a folder at each stroke, as an export script of a real
+//! scanner does.
 //!
 //! Files: the scanner starts when the host has accepted a stroke and the plate is at rest. The file is named
 //! `SESSION-STROKE-ATTEMPT.e57` and appears complete, except for a late one (`--late-file`). The scanner communicates

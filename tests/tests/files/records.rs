@@ -1,5 +1,6 @@
-//! Tests of records of every released format: they open, are extended and give the same strokes. A migration that is
-//! killed leaves the old format or the new one.
+//! Tests of records of every released format: they open, are extended and give the same strokes.
+//!
+//! A migration that is killed leaves the old format or the new one.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;

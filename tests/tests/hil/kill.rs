@@ -1,5 +1,6 @@
-//! Crash tests with `kill -9` of the real host, at each point of a stroke and at random. Every stroke is delivered once
-//! or reported.
+//! Crash tests with `kill -9` of the real host, at each point of a stroke and at random.
+//!
+//! Every stroke is delivered once or reported.
 //!
 //! The press holds the host at the point by its own behaviour, so no point depends on chance. `PLATEN_KILLS=500` sets
 //! the number of random kills.

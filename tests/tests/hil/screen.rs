@@ -1,5 +1,6 @@
-//! Tests of the pages of the real `platen run` beside the simulated press. In `tests/peers/screen` a browser reads
-//! them.
+//! Tests of the pages of the real `platen run` beside the simulated press.
+//!
+//! In `tests/peers/screen` a browser reads them.
 
 use std::io::{Read as _, Write as _};
 use std::net::TcpStream;

@@ -1,5 +1,6 @@
-//! Client connection to a bridge: sends and receives frames (sections 1 and 2 of the protocol). Every received frame is
-//! checked.
+//! Client connection to a bridge: sends and receives frames (sections 1 and 2 of the protocol).
+//!
+//! Every received frame is checked.
 
 use std::io::{ErrorKind, Read as _, Write as _};
 use std::net::TcpStream;

@@ -1,4 +1,6 @@
-//! Command `platen advise`: computes again the advice after a recorded stroke. Equal inputs give equal bytes.
+//! Command `platen advise`: computes again the advice after a recorded stroke.
+//!
+//! Equal inputs give equal bytes.
 
 use std::path::PathBuf;
 use std::process::ExitCode;

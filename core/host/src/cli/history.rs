@@ -1,4 +1,6 @@
-//! Command `platen history`: queries of the record, and its backup. All subcommands but `restore` only read.
+//! Command `platen history`: queries of the record, and its backup.
+//!
+//! All subcommands but `restore` only read.
 
 mod advice;
 mod backup;

@@ -1,5 +1,6 @@
-//! Minimal host for stroke tests: it does not check the link, keeps no journal and measures nothing. It publishes the
-//! bend index as a gap, so that a result under the wrong stroke is detected.
+//! Minimal host for stroke tests: it does not check the link, keeps no journal and measures nothing.
+//!
+//! It publishes the bend index as a gap, so that a result under the wrong stroke is detected.
 
 use std::time::Duration;
 

@@ -1,5 +1,6 @@
-//! Connection to one driver. One thread reads, another sends, so that Heartbeat and Abort take effect however many
-//! columns wait to be sent.
+//! Connection to one driver.
+//!
+//! One thread reads, another sends, so that Heartbeat and Abort take effect however many columns wait to be sent.
 
 use std::collections::VecDeque;
 use std::io::Write;

@@ -1,5 +1,7 @@
 //! Spool: a scan on disk as the frames ScanBegin, Columns in the order of measurement, and ScanEnd, byte for byte as
-//! sent. The same format serves Resume and recordings.
+//! sent.
+//!
+//! The same format serves Resume and recordings.
 
 use std::fs::File;
 use std::io::{BufReader, Seek, Write};
