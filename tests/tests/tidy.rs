@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// Workspace crates that each kind of crate may use in its library or program (not in its tests).
+/// Returns the workspace crates that each kind of crate may use in its library or program (not in its tests).
 fn allowed(name: &str, folder: &str) -> Option<&'static [&'static str]> {
     Some(match (folder, name) {
         (_, "platen-abi" | "platen-model" | "platen-numerics" | "platen-scan" | "platen-sim-plate") => &[],

@@ -243,7 +243,8 @@ fn the_host_that_is_killed() {
     }
 }
 
-/// At the start, an accepted stroke without a result is reported as interrupted and never scanned again.
+/// Settles the journal at the start: an accepted stroke without a result is reported as interrupted and never scanned
+/// again.
 fn settle(history: &mut History, recalled: &Recalled, seq: &mut u16) {
     let unfinished = |last: &&Entry| last.stage < Stage::Finished;
     if let Some(last) = recalled.last.as_ref().filter(unfinished) {
@@ -253,7 +254,7 @@ fn settle(history: &mut History, recalled: &Recalled, seq: &mut u16) {
     }
 }
 
-/// The press still holds the trigger of a recorded stroke: its recorded result is published again.
+/// Publishes the recorded result again, since the press still holds the trigger of a recorded stroke.
 fn again(history: &History, key: StrokeKey) {
     let last = history.archive().last(PRESS).unwrap().unwrap();
     assert_eq!(last.key, key);

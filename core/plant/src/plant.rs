@@ -139,7 +139,7 @@ pub struct Survey {
 }
 
 impl Default for PlantFile {
-    /// The values of an empty plant file in the current folder.
+    /// Returns the values of an empty plant file in the current folder.
     fn default() -> Self {
         Self {
             file: PathBuf::new(),

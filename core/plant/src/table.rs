@@ -195,7 +195,8 @@ impl<'d> TomlTable<'d> {
         });
     }
 
-    /// Like [`TomlTable::finish`], with a message made from the nearest key and all keys that were read.
+    /// Reports unknown keys like [`TomlTable::finish`], with a message made from the nearest key and all keys that were
+    /// read.
     pub(crate) fn finish_with(self, message: impl Fn(Option<&str>, &[String]) -> String) {
         for entry in self.entries.iter().filter(|entry| !self.asked.contains(&entry.key)) {
             let place = Place { key: self.place_of(&entry.key), offset: entry.key_span.start };

@@ -191,7 +191,7 @@ impl Unit {
         value * (self.numerator * other.denominator) / (self.denominator * other.numerator)
     }
 
-    /// All symbols that convert to this unit.
+    /// Returns all symbols that convert to this unit.
     fn family(&self) -> String {
         let family: Vec<_> =
             UNITS.iter().filter(|u| u.dimension == self.dimension).map(|u| u.symbol).collect();

@@ -60,17 +60,17 @@ pub trait Scanner: Send + Sized + 'static {
 
 /// Receiver of a scan and its job: a [`ScanSink`], or that of a test.
 pub trait ScanReceiver {
-    /// As [`Job::check`].
+    /// Acts as [`Job::check`].
     fn check(&self) -> Result<()>;
-    /// As [`Job::remaining`].
+    /// Acts as [`Job::remaining`].
     fn remaining(&self) -> Duration;
-    /// As [`Job::progress`].
+    /// Acts as [`Job::progress`].
     fn progress(&self, fraction: f64, phase: &str);
-    /// As [`ScanSink::begin`].
+    /// Acts as [`ScanSink::begin`].
     fn begin(&mut self, header: &ScanHeader) -> Result<()>;
-    /// As [`ScanSink::column`].
+    /// Acts as [`ScanSink::column`].
     fn column(&mut self, column: &Column) -> Result<()>;
-    /// As [`ScanSink::end`].
+    /// Acts as [`ScanSink::end`].
     fn end(&mut self, end: &ScanEnd) -> Result<()>;
 }
 

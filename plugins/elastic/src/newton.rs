@@ -72,8 +72,8 @@ pub(crate) fn minimise(
     Err(not_found(&format!("no minimum in {MAX_STEPS} steps")))
 }
 
-/// Backtracking line search: returns the largest of 1, 1/2, 1/4 ... that satisfies Armijo's rule without inverting a
-/// triangle, and the energy there. `here` is the energy at `x`.
+/// Performs a backtracking line search: returns the largest of 1, 1/2, 1/4 ... that satisfies Armijo's rule without
+/// inverting a triangle, and the energy there. `here` is the energy at `x`.
 fn line_search(
     energy: impl Fn(&[[f64; 2]]) -> f64,
     here: f64,

@@ -125,7 +125,7 @@ mod tests {
     use super::*;
     use crate::config::{Config, Timings};
 
-    /// Machine after one cycle, whose restart lasts until the next cycle.
+    /// Returns a machine after one cycle, whose restart lasts until the next cycle.
     fn running() -> Arc<Shared> {
         let timings = Timings { restart_ms: 0, ..Timings::default() };
         let shared = Shared::new(&Config { automatic: false, timings, ..Config::default() }).unwrap();

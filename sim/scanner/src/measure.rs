@@ -308,7 +308,8 @@ fn unit_interval(rng: &mut Pcg64) -> f64 {
 mod tests {
     use super::*;
 
-    /// Part of the power of a truncated Gaussian beam beyond a line `off` its middle, by strips of equal width.
+    /// Returns the part of the power of a truncated Gaussian beam beyond a line `off` its middle, by strips of equal
+    /// width.
     fn beyond(truncated: f64, off: f64) -> f64 {
         const STRIPS: i32 = 400;
         let width = 2.0 * truncated / f64::from(STRIPS);

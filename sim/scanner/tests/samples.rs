@@ -37,7 +37,7 @@ impl Sample {
         Plate::new(&state).unwrap()
     }
 
-    /// The sample's lattice; its columns run clockwise, ours counter-clockwise.
+    /// Returns the sample's lattice; its columns run clockwise, ours counter-clockwise.
     fn lattice(&self) -> SimLattice {
         let step = self.number("/lattice/step_deg").to_radians();
         let (n_rows, n_columns) = (self.number("/lattice/nrow") as u32, self.number("/lattice/ncol") as u32);

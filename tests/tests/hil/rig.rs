@@ -183,7 +183,7 @@ impl Host {
     }
 }
 
-/// Scanner and evaluation of the host.
+/// Runs scanner and evaluation of the host.
 async fn desk(
     mut orders: mpsc::UnboundedReceiver<Order>,
     answers: mpsc::UnboundedSender<Answer>,

@@ -38,7 +38,7 @@ pub struct RigidTransform {
 }
 
 impl Default for RigidTransform {
-    /// The identity.
+    /// Returns the identity.
     fn default() -> Self {
         Self { rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], translation: [0.0; 3] }
     }

@@ -32,27 +32,27 @@ fn u32_at(offset: u16) -> RegisterField {
     RegisterField::register(offset, RegisterType::U32)
 }
 
-/// A signed result in hundredths of a millimetre.
+/// Returns a field for a signed result in hundredths of a millimetre.
 fn signed_mm(offset: u16) -> RegisterField {
     i16_at(offset).scaled(0.01, Unit::MILLIMETRE).invalid(INVALID_I16)
 }
 
-/// An unsigned result in hundredths of a millimetre.
+/// Returns a field for an unsigned result in hundredths of a millimetre.
 fn unsigned_mm(offset: u16) -> RegisterField {
     u16_at(offset).scaled(0.01, Unit::MILLIMETRE).invalid(INVALID_U16)
 }
 
-/// A place on the plate in millimetres.
+/// Returns a field for a place on the plate in millimetres.
 fn place_mm(offset: u16) -> RegisterField {
     i16_at(offset).scaled(1.0, Unit::MILLIMETRE).invalid(INVALID_I16)
 }
 
-/// A share in tenths of a percent.
+/// Returns a field for a share in tenths of a percent.
 fn share(offset: u16) -> RegisterField {
     u16_at(offset).scaled(0.1, Unit::PERCENT).invalid(INVALID_U16)
 }
 
-/// A duration in hundredths of a second.
+/// Returns a field for a duration in hundredths of a second.
 fn duration(offset: u16) -> RegisterField {
     u16_at(offset).scaled(10.0, Unit::MILLISECOND).invalid(INVALID_U16)
 }
@@ -166,13 +166,13 @@ fn map(profile: Profile, read_count: u16, write_count: u16) -> RegisterMap {
 }
 
 impl RegisterMap {
-    /// The built-in map: 32 registers from 0 on for the press, 64 from 100 on for the host.
+    /// Returns the built-in map: 32 registers from 0 on for the press, 64 from 100 on for the host.
     pub fn pph1() -> Self {
         Self { inputs: inputs(), outputs: outputs(), ..map(Profile::Pph1, 32, 64) }
     }
 
-    /// A command word (bit 0 go, held until done) and a status word (2 running, 4 done, 8 error) with the largest
-    /// gap and deviations behind it. The press acknowledges a result by dropping "go".
+    /// Returns the map of profile `word`: a command word (bit 0 go, held until done) and a status word (2 running, 4
+    /// done, 8 error) with the largest gap and deviations behind it. The press acknowledges a result by dropping "go".
     pub fn word() -> Self {
         Self {
             inputs: BTreeMap::from([(
@@ -192,8 +192,8 @@ impl RegisterMap {
         }
     }
 
-    /// Trigger and acknowledge from the press, ready, busy, valid, pass, fail and error from the host, one register
-    /// each way, with the largest gap and deviations behind the status.
+    /// Returns the map of profile `bits`: trigger and acknowledge from the press, ready, busy, valid, pass, fail and
+    /// error from the host, one register each way, with the largest gap and deviations behind the status.
     pub fn bits() -> Self {
         Self {
             inputs: BTreeMap::from([
@@ -216,7 +216,7 @@ impl RegisterMap {
         }
     }
 
-    /// The built-in map of a profile.
+    /// Returns the built-in map of a profile.
     pub fn of(profile: Profile) -> Self {
         match profile {
             Profile::Pph1 => Self::pph1(),

@@ -233,7 +233,8 @@ pub(super) fn show_number(field: &RegisterField, number: f64) -> String {
 mod tests {
     use super::*;
 
-    /// The page of the map as raw words: 35.00 mm, 12 MN, -3.21 mm, 7/-8 mm, -1.5 degrees, 21.5 degrees Celsius.
+    /// Returns the example of the register page as raw words: 35.00 mm, 12 MN, -3.21 mm, 7/-8 mm, -1.5 degrees, 21.5
+    /// degrees Celsius.
     fn golden() -> Vec<u16> {
         let mut words = vec![0; 32];
         words[0] = 1;

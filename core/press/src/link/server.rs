@@ -138,7 +138,7 @@ impl Link for ServerLink {
         Ok(response.unwrap_or(Response::Exception(ExceptionCode::IllegalDataAddress.into())))
     }
 
-    /// The server continues: the press connects.
+    /// Does nothing: the server continues, and the press connects.
     fn disconnect(&mut self) {}
 }
 
@@ -150,7 +150,7 @@ fn part(block: &Block, start: u16, count: u16) -> Option<Range<usize>> {
 }
 
 impl Registers {
-    /// The words are plain numbers: a panic elsewhere cannot leave them inconsistent.
+    /// Locks the words. They are plain numbers, so a panic elsewhere cannot leave them inconsistent.
     fn lock(&self) -> MutexGuard<'_, Words> {
         self.words.lock().unwrap_or_else(PoisonError::into_inner)
     }

@@ -401,7 +401,7 @@ impl<L: Link> Runner<L> {
         }
     }
 
-    /// If the host has dropped its end of the channel, that alone stops the handshake.
+    /// Sends an order to the host. If the host has dropped its end of the channel, that alone stops the handshake.
     fn order(&self, order: Order) {
         let _ = self.side.orders.send(order);
     }

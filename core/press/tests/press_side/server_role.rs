@@ -16,7 +16,7 @@ async fn ask(host: SocketAddr) -> Context {
     tcp::connect_slave(host, Slave(1)).await.unwrap()
 }
 
-/// Client of the press: writes its own block and reads the host's every 10 ms.
+/// Runs the client of the press: writes its own block and reads the host's every 10 ms.
 async fn exchange(plc: SharedPlc, host_at: SocketAddr) {
     let mut context = ask(host_at).await;
     loop {

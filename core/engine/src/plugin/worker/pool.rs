@@ -28,7 +28,7 @@ fn taken(memory: &SharedMemory) -> &AtomicU32 {
     unsafe { AtomicU32::from_ptr(memory.data().cast()) }
 }
 
-/// Host side: counts a frame as copied.
+/// Counts a frame as copied, on the host's side.
 pub(super) fn release(memory: &SharedMemory) {
     let taken = taken(memory);
     taken.fetch_add(1, Ordering::Release);
