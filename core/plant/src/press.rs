@@ -170,7 +170,7 @@ pub enum OnMissed {
     /// A warning.
     #[default]
     Warn,
-    /// An error until error_reset; measuring goes on.
+    /// An error until error_reset; measuring continues.
     Error,
     /// An error, and no stroke is accepted until error_reset.
     Block,

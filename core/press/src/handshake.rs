@@ -137,7 +137,7 @@ pub enum Transition {
     PressRejected,
     /// Another live host writes to this press; nothing was written.
     SecondHostFound,
-    /// The active stroke goes on after a reconnection, or its journalled result is published after a restart.
+    /// The active stroke continues after a reconnection, or its journalled result is published after a restart.
     StrokeResumed,
     /// A trigger that was up at the first read is accepted as a stroke.
     WaitingStrokeAccepted,
@@ -177,7 +177,7 @@ pub enum Transition {
     FaultReset,
     /// The host ends.
     Stopped,
-    /// The heartbeat of the press stands still.
+    /// The heartbeat of the press no longer changes.
     HeartbeatLost,
     /// A stroke came while another was active.
     StrokeMissed,

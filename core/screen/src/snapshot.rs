@@ -32,13 +32,13 @@ pub struct Snapshot {
     pub scanner: ScannerPart,
     /// Record of strokes.
     pub record: RecordPart,
-    /// Plate in hand.
+    /// Present plate.
     pub plate: Option<PlatePart>,
-    /// Stroke in hand.
+    /// Present stroke.
     pub stroke: Option<StrokePart>,
-    /// Result of the stroke in hand.
+    /// Result of the present stroke.
     pub result: Option<ResultPart>,
-    /// The newest strokes of this plate with the one in hand, oldest first.
+    /// The newest strokes of this plate, including the present one, oldest first.
     pub strip: Vec<StripPart>,
     /// Active alarms, the most urgent first.
     pub alarms: Vec<ShownAlarm>,
@@ -102,7 +102,7 @@ pub struct RecordPart {
     pub lost: u64,
 }
 
-/// Plate in hand.
+/// Present plate.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PlatePart {
     /// Its name from the plate file, else from the press; null before the first measurement if the press gives no name.
@@ -117,7 +117,7 @@ pub struct PlatePart {
     pub press_side: Option<[i8; 2]>,
 }
 
-/// Stroke in hand.
+/// Present stroke.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct StrokePart {
     /// Its record; null before it is scanned.
@@ -152,7 +152,7 @@ pub enum Stage {
     Done,
 }
 
-/// Result of the stroke in hand.
+/// Result of the present stroke.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ResultPart {
     /// Its record.
@@ -191,7 +191,7 @@ pub struct Worst {
     pub sense: i8,
 }
 
-/// A stroke of the plate in hand.
+/// Stroke of the present plate.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct StripPart {
     /// Label.

@@ -12,7 +12,7 @@ fn program(arguments: &[&str]) -> Command {
     command
 }
 
-/// Running press and its addresses.
+/// Starts a press; returns it with its addresses.
 fn press(arguments: &[&str]) -> (Child, BufReader<ChildStdout>, String, String) {
     let mut child = program(&[&["press", "--with-parent"], arguments].concat()).spawn().unwrap();
     let mut out = BufReader::new(child.stdout.take().unwrap());

@@ -207,7 +207,7 @@ fn until_a_calibration_the_range_error_of_the_class_stands_in() {
         result["says"]
     );
 
-    // A file of another maker: nobody states anything, and the stand-in is named.
+    // A file of another maker: no range error is stated, and the assumed one is reported.
     let other = plant.path("other.xyb");
     let output = platen_tests::program("platen-sim")
         .arg("scanner")

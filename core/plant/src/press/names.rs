@@ -179,7 +179,7 @@ names! {
     }
 }
 
-/// Returns the dimension of a figure: that of the field it stands in by default.
+/// Returns the dimension of a figure: that of its default field.
 pub(crate) fn dimension_of(measure: Measure) -> Option<Dimension> {
     Output::ALL.iter().find(|output| output.measure() == Some(measure)).map(|output| output.dimension())
 }

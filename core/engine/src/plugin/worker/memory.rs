@@ -102,7 +102,7 @@ impl AsFd for SharedMemory {
 impl AsMut<[u8]> for SharedMemory {
     fn as_mut(&mut self) -> &mut [u8] {
         assert!(self.writable, "inputs are read-only");
-        // SAFETY: mapped for writing; before it is sent nobody else maps it.
+        // SAFETY: mapped for writing; before it is sent no other process maps it.
         unsafe { std::slice::from_raw_parts_mut(self.data.as_ptr(), self.bytes) }
     }
 }

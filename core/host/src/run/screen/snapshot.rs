@@ -178,7 +178,7 @@ impl Facts {
         }
     }
 
-    /// Returns the result of the stroke in hand (rules R3 to R5).
+    /// Returns the result of the present stroke (rules R3 to R5).
     fn result<'a>(&self, status: &'a Status) -> Option<&'a Publication> {
         let is_done = stage(status.state.work) == Stage::Done;
         let in_step = status.state.link == LinkState::Online;
