@@ -9,7 +9,7 @@
 //! cut off where it leaves the plate, so that a template that reaches the edge also loses the doubtful strip. A
 //! template whose verdict is not the same in all repetitions gets `cannot_tell`.
 //!
-//! Limits: only the edges in `edge_doubts` are treated as doubtful. All coordinates are moved by the same amount, not
+//! Limits: only edges found by `edge_doubts` are treated as doubtful. All coordinates are moved by the same amount, not
 //! in proportion to their distance from the edge.
 
 use platen_model::{Centre, Report, Task, Template, Verdict};
