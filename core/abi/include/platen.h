@@ -128,7 +128,7 @@ enum { PLATEN_DESC_HARDWARE = 1 };
 /* Descriptor of a plugin: static data, available without I/O. */
 typedef struct platen_desc {
   uint32_t struct_size, flags;
-  const char *id, *kind, *name, *vendor, *version, *doc, *url, *license; /* kind: scanner, flattening, comparison */
+  const char *id, *kind, *name, *vendor, *version, *doc, *url, *license; /* kind: scanner, flattening, comparison, advisor */
   const char *const *inputs, *const *outputs;                            /* formats, NULL at the end; or NULL */
   const platen_option *options;
   uint32_t n_options, reserved;

@@ -44,7 +44,7 @@ pub mod status {
 
 /// Bits of [`Error::flags`].
 pub mod error_flag {
-    /// A retry may succeed, whatever the status says.
+    /// A retry may succeed, whatever the status is.
     pub const RETRYABLE: u32 = 1;
 }
 
@@ -216,7 +216,7 @@ pub struct Desc {
     pub flags: u32,
     /// Name in plant files, e.g. `faro-file`.
     pub id: *const c_char,
-    /// `scanner`, `flattening` or `comparison`.
+    /// `scanner`, `flattening`, `comparison` or `advisor`.
     pub kind: *const c_char,
     /// Display name.
     pub name: *const c_char,

@@ -1,7 +1,7 @@
 //! Benchmark of each stage from columns to S(u, v).
 //!
 //! Scene: a 4 x 4 m plate rolled to R 12 m among 1.6 million cells, 1 mm range noise, 2 % dropouts, about 300,000
-//! samples on the plate. `cargo bench -p platen-shape`; one thread.
+//! samples on the plate. `cargo bench -p platen-shape`; `outline` and `measure` use two threads, the others one.
 //!
 //! `finish`, `outline` and the stages of `measure` follow the last column; `lattice_in_memory` comprises all stages,
 //! with the harmonic map.

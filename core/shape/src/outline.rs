@@ -193,8 +193,8 @@ pub fn outline(patch: &Patch, spec: &PlateSpec) -> Result<Outline, OutlineError>
 /// positive towards its middle.
 ///
 /// The geodesic curvature of the boundary, the Gaussian curvature of the face and the turns at the corners add up to a
-/// whole turn (Gauss-Bonnet theorem). The corners are taken as right angles, as they were cut. Then the integral along the
-/// boundary is minus the Gaussian curvature times the area.
+/// whole turn (Gauss-Bonnet theorem). The corners are taken as right angles, as they were cut. Then the integral along
+/// the boundary is minus the Gaussian curvature times the area.
 fn edge_curvature(gaussian: f64, corners: &[Vec3; 4]) -> f64 {
     let [a, b, c, d] = corners;
     let area = 0.5 * (c - a).cross(&(d - b)).norm();
@@ -281,7 +281,8 @@ fn curve(edge: &Edge, ends: [Vec3; 2]) -> EdgeCurve {
 mod tests {
     use super::*;
 
-    /// Two meridians and two parallels of a sphere meet at right angles; a parallel at the latitude f turns by sin f per radian of longitude.
+    /// Two meridians and two parallels of a sphere meet at right angles. A parallel at the latitude f turns by sin f per
+    /// radian of longitude.
     #[test]
     fn the_edges_of_a_plate_turn_by_its_gaussian_curvature() {
         let (radius, width, south, north) = (10.0, 0.3, -0.1_f64, 0.25_f64);

@@ -11,7 +11,7 @@ pub(super) type PluginStates = Arc<Mutex<Vec<PluginStatus>>>;
 /// State of one plugin.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PluginStatus {
-    /// `scanner`, `flattening` or `comparison`.
+    /// `scanner`, `flattening`, `comparison` or `advisor`.
     pub kind: String,
     /// Name.
     pub plugin: String,

@@ -72,7 +72,8 @@ impl Blank {
     pub fn of_mesh(mesh: &DiskMesh) -> Result<Self, BlankError> {
         let rough = |reason: &str| BlankError::Rough { reason: reason.to_owned() };
         let flat = lay_flat(mesh).map_err(|e| rough(&e.to_string()))?;
-        let flat = flat.ok_or_else(|| rough("its mesh folds over"))?;
+        let flat =
+            flat.ok_or_else(|| rough("its mesh folds over, or does not come to rest, when it is laid flat"))?;
         let curves = [0, 1, 2, 3].map(|edge| {
             let vertices = mesh.edge(edge).map(|at| mesh.boundary[at % mesh.boundary.len()] as usize);
             Curve::fit(&vertices.map(|vertex| flat.uv[vertex]).collect::<Vec<_>>())

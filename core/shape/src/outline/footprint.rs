@@ -69,7 +69,7 @@ fn by_number<'a>(lines: impl Iterator<Item = &'a LatticeLine>, angle: f64) -> f6
 pub(super) fn at_edge(lines: &[LatticeLine], edge: impl Fn(f64) -> f64, all: f64, beam: BeamModel) -> f64 {
     /// Steps to each side and their size, in parts of `all`: coarse ones first, then finer ones about the best.
     const SEARCH: [(i32, f64); 2] = [(5, 0.16), (7, 0.02)];
-    /// Lines whose likelihoods are multiplied before a logarithm is taken: each is above 10^-4.
+    /// Lines whose likelihoods are multiplied before a logarithm is taken: each is above 10^-6.
     const TOGETHER: usize = 16;
     let showing: Vec<(&LatticeLine, f64)> =
         lines.iter().filter(|l| l.shows_footprint()).map(|l| (l, edge(l.along))).collect();
