@@ -92,9 +92,9 @@ impl Shop {
     /// values would be learned.
     pub(super) fn wrong_files() -> Vec<Self> {
         vec![
-            Self { yields: 1.25, ..Self::of("steel 25 % stronger than told") },
-            Self { yields: 0.75, ..Self::of("steel 25 % weaker than told") },
-            Self { thicker: 2e-3, ..Self::of("2 mm thicker than told") },
+            Self { yields: 1.25, ..Self::of("steel 25 % stronger than stated") },
+            Self { yields: 0.75, ..Self::of("steel 25 % weaker than stated") },
+            Self { thicker: 2e-3, ..Self::of("2 mm thicker than stated") },
         ]
     }
 }

@@ -71,7 +71,7 @@ impl Strategy {
                     () if *it == whole => "",
                     () if !it.like => ", no like plates",
                     () if !it.learns => ", never learns",
-                    () if !it.depth => ", depth not told",
+                    () if !it.depth => ", depth not reported",
                     () if !it.guard => ", no guard",
                     () => ", first plan kept",
                 };
