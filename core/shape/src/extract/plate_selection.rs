@@ -31,8 +31,8 @@ const OTHER_AREA: f64 = 0.08;
 const WHOLE: f64 = 0.05;
 
 /// A face lies behind the plate when the plate hides at least the part `BEHIND` of the face's rectangle, and at least
-/// `BEHIND_OF_MISSING` of the part of the rectangle in which the face is not seen. An object that stands on a table
-/// hides more.
+/// `BEHIND_OF_MISSING` of the part of the rectangle in which less of the face is seen than of the plate in its own (the
+/// rim of every face is lost over some cells). An object that stands on a table hides more.
 const BEHIND: f64 = 0.1;
 const BEHIND_OF_MISSING: f64 = 0.5;
 
@@ -68,11 +68,16 @@ impl Candidate {
             && (0..2).all(|k| SIDE.contains(&(self.rectangle.sides[k] / expected[k])))
     }
 
+    /// Returns the part of its rectangle in which the face is seen.
+    fn filled(&self) -> f64 {
+        self.area / (self.rectangle.sides[0] * self.rectangle.sides[1])
+    }
+
     /// Returns true when this face, next to the plate's, is not the plate: it has another size and either is seen whole
     /// or lies behind the plate, which hides the rest of it (a table).
     fn is_another_than(&self, plate: &Self) -> bool {
         let has_other_size = (self.area / plate.area).ln().abs() > OTHER_AREA;
-        let missing = 1.0 - self.area / (self.rectangle.sides[0] * self.rectangle.sides[1]);
+        let missing = 1.0 - self.filled() / plate.filled();
         let behind = self.rectangle.share_behind(&plate.rectangle);
         has_other_size && (self.hidden < WHOLE || behind > BEHIND.max(BEHIND_OF_MISSING * missing))
     }
