@@ -84,6 +84,9 @@ pub enum Roughness {
     CurvatureChange,
 }
 
+/// Second difference of neighbouring coefficients.
+const SECOND_DIFFERENCE: [f64; 3] = [1.0, -2.0, 1.0];
+
 impl CurveFit {
     /// Builds the equations without data: the derivative varies as white noise over `length` with the standard
     /// deviation `spread`.
@@ -92,7 +95,7 @@ impl CurveFit {
         let n = knots.n_coefficients();
         let mut matrix = DMatrix::zeros(n, n);
         let (stencil, order): (&[f64], i32) = match roughness {
-            Roughness::Curvature => (&[1.0, -2.0, 1.0], 2),
+            Roughness::Curvature => (&SECOND_DIFFERENCE, 2),
             Roughness::CurvatureChange => (&[-1.0, 3.0, -3.0, 1.0], 3),
         };
         let scale = knots.step() / (length * spread * spread) * knots.step().powi(-2 * order);
@@ -106,8 +109,9 @@ impl CurveFit {
         Self { knots, matrix, right: DVector::zeros(n) }
     }
 
-    /// Starts without data: the curvature is an amplitude times `profile`, and varies about that as white noise over
-    /// `length` with the standard deviation `spread`. The amplitude is given by its mean and standard deviation.
+    /// Builds the equations without data: the curvature is an amplitude times `profile`, and varies about that as white
+    /// noise over `length` with the standard deviation `spread`. The amplitude is given by its mean and standard
+    /// deviation.
     #[must_use]
     pub fn with_curvature(
         knots: UniformKnots,
@@ -123,7 +127,7 @@ impl CurveFit {
         let (mut functional, mut square) = (DVector::zeros(knots.n_coefficients()), 0.0);
         for k in 0..=knots.n_spans() {
             let value = profile(knots.start() + k as f64 * step);
-            [1.0, -2.0, 1.0].iter().enumerate().for_each(|(i, factor)| functional[k + i] += factor * value);
+            SECOND_DIFFERENCE.iter().enumerate().for_each(|(i, factor)| functional[k + i] += factor * value);
             square += value * value;
         }
         // Their covariance S = s^2 I + a^2 f f^T has the inverse (I - f f^T a^2 / t) / s^2, and S^-1 f = f / t, with

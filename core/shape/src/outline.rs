@@ -151,7 +151,7 @@ pub fn outline(patch: &Patch, spec: &PlateSpec) -> Result<Outline, OutlineError>
         noise: patch.noise,
     };
     let side_face = SideFace::of(spec);
-    let curvature = edge_curvature(height_field.gaussian_curvature(&near), &near);
+    let mean_curvature = edge_curvature(height_field.gaussian_curvature(&near), &near);
     let side = |k: usize| {
         let (from, to) = (near[k], near[(k + 1) % 4]);
         let margin = CORNER_STEPS * visible.step;
@@ -160,7 +160,7 @@ pub fn outline(patch: &Patch, spec: &PlateSpec) -> Result<Outline, OutlineError>
             .filter_map(|crossing| ProjectedCrossing::of(crossing, patch, &height_field))
             .filter(|s| [from, to].iter().all(|corner| (s.crossing.inside - corner).norm() > margin))
             .collect();
-        EdgeData::new(crossings, [from, to], spec.thickness, side_face, curvature, sampling)
+        EdgeData::new(crossings, [from, to], spec.thickness, side_face, mean_curvature, sampling)
     };
     let [a, b, c, d] = of_each(side);
     let mut edges = edge::fit_all([a?, b?, c?, d?], sampling)?;

@@ -80,7 +80,7 @@ pub(super) struct EdgeData {
     lines: Vec<LatticeLine>,
     dithered: bool,
     /// Mean curvature of the edges of the plate by its membrane strain, 1/m, positive inwards.
-    strain: f64,
+    mean_curvature: f64,
     from: Vec3,
     to: Vec3,
 }
@@ -95,14 +95,14 @@ impl EdgeData {
         [from, to]: [Vec3; 2],
         thickness: f64,
         side_face: SideFace,
-        strain: f64,
+        mean_curvature: f64,
         sampling: Sampling,
     ) -> Result<Self, OutlineError> {
         let strip = DevelopedStrip::new(&crossings, [from, to], 0.5 * thickness, sampling)?;
         let line = |crossing| LatticeLine::new(&strip, crossing, &side_face, sampling);
         let lines: Vec<LatticeLine> = crossings.iter().map(line).collect();
         let dithered = is_dithered(&lines, |along| strip.base(along), sampling.step);
-        Ok(Self { strip, side_face, crossings, lines, dithered, strain, from, to })
+        Ok(Self { strip, side_face, crossings, lines, dithered, mean_curvature, from, to })
     }
 
     /// Replaces lines, given by their numbers, by those beside a strip of background narrower than a beam.
@@ -204,14 +204,9 @@ impl Edge {
         let (start, end) = strip.span();
         let axis = UniformKnots::new(start, end, ((end - start) / SPAN).ceil() as usize);
         let (from, to) = (strip.flatten(data.from).x, strip.flatten(data.to).x);
-        let strain = [data.strain, STRAIN_SPREAD * data.strain];
-        let prior = CurveFit::with_curvature(
-            axis,
-            |along| strain_profile(along, [from, to]),
-            strain,
-            CURVATURE.0,
-            CURVATURE.1,
-        );
+        let profile = |along| strain_profile(along, [from, to]);
+        let amplitude = [data.mean_curvature, STRAIN_SPREAD * data.mean_curvature];
+        let prior = CurveFit::with_curvature(axis, profile, amplitude, CURVATURE.0, CURVATURE.1);
         let with_contrasts = prior.clone().with_parameters(known.planes());
         let too_few = || strip.too_few();
         let fit = |beam: BeamModel| {
