@@ -2,7 +2,7 @@
 //!
 //! | module | contents |
 //! |---|---|
-//! | `plugin` | plugin libraries: found by name, checked, loaded; scanner, flattening and comparison behind safe types |
+//! | `plugin` | plugin libraries: found by name, checked, loaded; scanner, flattening, comparison and advisor behind safe types |
 //! | `pipeline` | the plugins of one plant file, configured, and the place of the scanner |
 //! | `calibration` | the calibration file of a scanner and the conditions under which it is valid |
 //! | `doubtful_edge` | verdicts that depend on a doubtful edge, withdrawn |
