@@ -11,7 +11,8 @@
 //! **Method.**
 //!
 //! - A plane n . x = 1 has the inverse range n . d along the unit direction d. This is linear in n, so that a plane is
-//!   fitted by linear least squares at any incidence.
+//!   fitted by linear least squares at any incidence. A plane seen only in front of the plate is uncertain behind it; it
+//!   is turned to where it holds most of the cells there.
 //! - A cell on a plane is not a mixed pixel, whatever the ranges of its neighbours. There are two exceptions. About one
 //!   mixed pixel in a hundred has the range of a plane by chance (more before a plane whose continuation is close
 //!   behind the edge): a mixed pixel stays mixed if it is alone on a plane that holds few of them. It also stays mixed
@@ -92,11 +93,12 @@ pub(super) struct Background {
 }
 
 impl Background {
-    /// Returns the plane on which a cell lies.
-    pub(super) fn at(&self, index: usize) -> Option<PlaneBehind> {
+    /// Returns the plane on which a cell lies; `next` is the cell behind it along its row or column.
+    pub(super) fn at(&self, index: usize, next: Option<usize>) -> Option<PlaneBehind> {
         let number = self.numbers[index]?;
         let vector = self.planes[usize::from(number)].vector;
-        Some(PlaneBehind { number, distance: (1.0 / vector.norm()) as f32 })
+        let narrow = next.is_none_or(|next| self.numbers[next] != Some(number));
+        Some(PlaneBehind { number, distance: (1.0 / vector.norm()) as f32, narrow })
     }
 
     /// Returns the numbers of the flat planes that, if they extend so far, are in front of the background cell `behind`

@@ -209,7 +209,7 @@ impl Scene<'_> {
             strips,
             complete: cells.clone().all(|(_, at)| self.pixels[at] != Pixel::Unknown),
             excess: excess as f32,
-            background: measured.and_then(|at| self.background.at(at)),
+            background: measured.and_then(|at| self.background.at(at, self.beside(index, step, far + 1))),
             beyond,
         };
         Some((crossing, cut))

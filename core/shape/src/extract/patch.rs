@@ -39,6 +39,8 @@ pub struct PlaneBehind {
     pub number: u8,
     /// Distance from the scanner, metres.
     pub distance: f32,
+    /// True when the row or column meets the plane in this cell only.
+    pub narrow: bool,
 }
 
 /// A set of planes of the background.

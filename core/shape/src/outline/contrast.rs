@@ -251,7 +251,7 @@ impl Mixing {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use platen_numerics::normal_distribution::cdf;
 
     use super::*;
@@ -276,9 +276,14 @@ mod tests {
             strips: PlaneSet::default(),
             complete: true,
             excess: JUMP as f32,
-            background: Some(PlaneBehind { number: 2, distance: (RANGE + JUMP) as f32 }),
+            background: Some(PlaneBehind { number: 2, distance: (RANGE + JUMP) as f32, narrow: false }),
             beyond: Beyond::Behind,
         }
+    }
+
+    /// Returns the mixing of a pixel in whose echo both surfaces have the same part.
+    pub(crate) fn half() -> Mixing {
+        Mixing::of(&crossing(0.5), 1e-3).unwrap()
     }
 
     /// Returns the contrasts of planes whose echo is `times` that of the face at the same incidence.

@@ -120,7 +120,8 @@ impl EdgeData {
 ///   mean of these estimates is the start value of the second fit.
 /// - The footprint is a property of the scanner, not of the edge. An edge with a far larger one than the others has a
 ///   strip of background beside it, whose far edge also mixes the beams. Such an edge is fitted with the footprint of
-///   the others, and only with the mixed pixels that certainly see the plate.
+///   the others, and only with the mixed pixels that certainly see the plate. So is a part of an edge with mixed pixels
+///   outside of its footprint.
 /// - In the second fit, the contrasts found at the other edges are the prior of those of an edge.
 ///
 /// # Errors
@@ -145,6 +146,10 @@ pub(super) fn fit_all(mut edges: [EdgeData; 4], sampling: Sampling) -> Result<[E
     for (edge, data) in first.iter_mut().zip(&mut edges) {
         if edge.take_if(|edge| edge.footprint > most).is_some() {
             data.take_for_strip(0..data.lines.len(), sampling);
+        } else if let Some(edge) = edge {
+            let at = |along| edge.posterior.curve.at(along);
+            let lines = background_strip::contradicting(&data.lines, at, edge.footprint);
+            data.take_for_strip(lines, sampling);
         }
     }
     let found: Vec<f64> = first.iter().flatten().map(|edge| edge.footprint).collect();

@@ -101,6 +101,8 @@ pub(super) struct LatticeLine {
     /// Planes of the background of which a strip may be visible here, and the plane visible beyond the edge.
     pub(super) strips: PlaneSet,
     pub(super) background: Option<u8>,
+    /// True when only one cell lies on that plane.
+    pub(super) narrow: bool,
     /// Mixing of the plate with a plane of the background. Where the side face is seen it is that of the silhouette,
     /// which does not determine the edge of the face.
     mixing: Option<Mixing>,
@@ -157,6 +159,7 @@ impl LatticeLine {
             mixed: mixed.map(|[a, b]| (a.min(b), a.max(b))),
             strips: crossing.strips,
             background: crossing.background.map(|plane| plane.number),
+            narrow: crossing.background.is_some_and(|plane| plane.narrow),
             mixing: Mixing::of(crossing, noise)
                 .map(|mixing| if sight.silhouette == 0.0 { mixing } else { mixing.without_odds() }),
             complete: crossing.complete,
@@ -192,7 +195,7 @@ impl LatticeLine {
         self.mixing.map_or([1.0; 2], |mixing| mixing.seen(&beam.contrasts)).map(|part| part * radius)
     }
 
-    /// Returns true when its mixed pixel determines the position of the edge, given the contrast.
+    /// Returns true when it has a single mixed pixel that determines the position of the edge, given the contrast.
     pub(super) fn tells_contrast(&self) -> bool {
         self.mixing.is_some_and(|mixing| mixing.tells())
     }
@@ -295,6 +298,7 @@ pub(super) mod tests {
             mixed: None,
             strips: PlaneSet::default(),
             background: None,
+            narrow: false,
             mixing: None,
             complete: true,
             beyond: Beyond::Behind,
@@ -315,6 +319,11 @@ pub(super) mod tests {
     /// Returns the same line where the side face is hidden, with these mixed pixels.
     pub(crate) fn open_line(mixed: Option<(f64, f64)>) -> LatticeLine {
         LatticeLine { side: 0.0, mixed, ..line(0.0) }
+    }
+
+    /// Returns the same line with one mixed pixel that determines the position of the edge.
+    pub(crate) fn one_pixel_line(at: f64) -> LatticeLine {
+        LatticeLine { mixing: Some(super::super::contrast::tests::half()), ..open_line(Some((at, at))) }
     }
 
     /// Returns the likelihood of an edge `far` inside of the last cell of the face, over that at the cell, with 0.7 mm
