@@ -24,6 +24,10 @@ const REACH: u32 = 48;
 /// chance.
 const LEAST: usize = 3;
 
+/// Least number of lines on one side that end on a single cell of the plane. With 3, 65 of 300 scenes without a strip
+/// differ by more than 0.02 mm, with 6 it is 12.
+const LEAST_NARROW: usize = 6;
+
 /// Distance outside of an edge beyond which a mixed pixel does not see it, in footprints.
 const OUTSIDE: f64 = 1.25;
 
@@ -38,7 +42,7 @@ pub(super) fn shown(edges: [&[LatticeLine]; 4]) -> [Vec<usize>; 4] {
         let near: Vec<&LatticeLine> = on_plane.filter(|other| is_near(line, other)).collect();
         let narrow = near.iter().copied().filter(|other| other.narrow);
         sides(line, near.iter().copied()).iter().any(|both| both.iter().all(|count| *count >= LEAST))
-            || sides(line, narrow).iter().flatten().any(|count| *count >= LEAST)
+            || sides(line, narrow).iter().flatten().any(|count| *count >= LEAST_NARROW)
     };
     let is_beside = |line: &LatticeLine| line.strips.numbers().any(|plane| shows(line, plane));
     edges.map(|lines| (0..lines.len()).filter(|at| is_beside(&lines[*at])).collect())
@@ -119,7 +123,7 @@ mod tests {
         assert!((6..54).step_by(2).all(|k| end.contains(&k)) && !end.iter().any(|k| *k >= 60), "{end:?}");
         // One cell wide it goes on.
         let taper = shown(true, &|k| k < 60);
-        assert!((60..104).step_by(2).all(|k| taper.contains(&k)) && !taper.contains(&110), "{taper:?}");
+        assert!((60..98).step_by(2).all(|k| taper.contains(&k)) && !taper.contains(&98), "{taper:?}");
         assert!(shown(true, &|k| k == 51 || k == 151).is_empty());
     }
 
