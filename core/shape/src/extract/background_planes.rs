@@ -295,7 +295,7 @@ impl BackgroundPlane {
     /// Returns the plane given one more cell on it; `None` where that is not finite.
     fn given(&self, cell: &BackgroundCell) -> Option<Self> {
         let row = cell.direction / cell.sigma;
-        let mut information = self.information.clone();
+        let mut information = self.information;
         information.rank_one_update(&row, 1.0);
         let off = cell.inverse / cell.sigma - row.dot(&self.vector);
         let vector = self.vector + information.solve(&(row * off));
