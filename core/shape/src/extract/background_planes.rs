@@ -11,8 +11,7 @@
 //! **Method.**
 //!
 //! - A plane n . x = 1 has the inverse range n . d along the unit direction d. This is linear in n, so that a plane is
-//!   fitted by linear least squares at any incidence. A plane seen only in front of the plate is uncertain behind it; it
-//!   is turned to where it holds most of the cells there.
+//!   fitted by linear least squares at any incidence.
 //! - A cell on a plane is not a mixed pixel, whatever the ranges of its neighbours. There are two exceptions. About one
 //!   mixed pixel in a hundred has the range of a plane by chance (more before a plane whose continuation is close
 //!   behind the edge): a mixed pixel stays mixed if it is alone on a plane that holds few of them. It also stays mixed
@@ -50,9 +49,6 @@ const LEAST_CELLS: usize = 24;
 /// Largest number of planes, and number of triples of cells tried for each.
 pub(crate) const PLANES: usize = 6;
 const TRIALS: usize = 300;
-
-/// Number of cells to each of which a plane is turned.
-const TURNS: usize = 64;
 
 /// Number of cells before and behind the first cell of a triple among which the second and third are drawn.
 const NEAR: usize = 32;
@@ -277,29 +273,11 @@ impl BackgroundPlane {
         Some(Self { vector, information, scatter })
     }
 
-    /// Returns the plane turned within its uncertainty so that it holds most of the cells (maximum consensus), if these
-    /// are at least [`LEAST_CELLS`]. A plane determined by a narrow border of cells is uncertain far from them: the few
-    /// cells near its mean there may be on it by chance, and those of a strip not near it.
-    fn turned_to(self, cells: &[BackgroundCell]) -> Self {
-        let near: Vec<&BackgroundCell> =
-            cells.iter().filter(|cell| self.depth(cell).abs() <= BOUND).collect();
-        let every = near.len().div_ceil(TURNS).max(1);
-        let turned = near.iter().step_by(every).filter_map(|cell| {
-            let plane = self.given(cell)?;
-            Some((near.iter().filter(|cell| plane.holds(cell)).count(), plane))
-        });
-        let most = turned.max_by_key(|(count, _)| *count);
-        most.filter(|(count, _)| *count >= LEAST_CELLS).map_or(self, |(_, plane)| plane)
-    }
-
-    /// Returns the plane given one more cell on it; `None` where that is not finite.
-    fn given(&self, cell: &BackgroundCell) -> Option<Self> {
-        let row = cell.direction / cell.sigma;
-        let mut information = self.information;
-        information.rank_one_update(&row, 1.0);
-        let off = cell.inverse / cell.sigma - row.dot(&self.vector);
-        let vector = self.vector + information.solve(&(row * off));
-        vector.iter().all(|x| x.is_finite()).then_some(Self { vector, information, scatter: self.scatter })
+    /// Fits a plane to the cells on it, starting from a plane near it. The cells on a plane through three of them are a
+    /// biased choice, which tilts a first fit in their favour; hence a second fit.
+    fn fit_near(cells: &[BackgroundCell], plane: Vec3) -> Option<Self> {
+        let first = Self::fit(cells, |cell| cell.is_on(&plane))?;
+        Self::fit(cells, |cell| cell.is_on(&first.vector))
     }
 
     /// Returns true when a cell is on the plane and the plane is known well enough there.
@@ -337,14 +315,13 @@ fn find(mut sound: Vec<BackgroundCell>, mixed: &[BackgroundCell]) -> Vec<Backgro
     let every = sound.len().div_ceil(ENOUGH).max(1);
     while planes.len() < PLANES {
         let few: Vec<BackgroundCell> = sound.iter().step_by(every).copied().collect();
-        let first = most_common(&few, &mut random)
-            .and_then(|plane| BackgroundPlane::fit(&sound, |cell| cell.is_on(&plane)));
+        let first = most_common(&few, &mut random).and_then(|plane| BackgroundPlane::fit_near(&sound, plane));
         // The strips that the plane predicts determine it more accurately there.
-        let with_strips = |plane: BackgroundPlane| {
-            let plane = plane.turned_to(mixed);
-            BackgroundPlane::fit(sound.iter().chain(mixed), |cell| plane.holds(cell))
+        let Some(plane) =
+            first.and_then(|plane| BackgroundPlane::fit(sound.iter().chain(mixed), |cell| plane.holds(cell)))
+        else {
+            break;
         };
-        let Some(plane) = first.and_then(with_strips) else { break };
         let is_seen = plane.is_seen(&sound);
         sound.retain(|cell| !plane.holds(cell));
         if is_seen {
