@@ -56,19 +56,13 @@ pub(super) fn contradicting(lines: &[LatticeLine], edge: impl Fn(f64) -> f64, fo
         let least = edge(line.along) - OUTSIDE * footprint * line.per_radian;
         line.tells_contrast() && line.mixed.is_some_and(|(at, _)| at < least)
     };
-    let doubtful = || lines.iter().filter(|line| !line.strips.is_empty());
-    let far: Vec<&LatticeLine> = doubtful().filter(is_far).collect();
+    let is_doubtful = |line: &&LatticeLine| !line.strips.is_empty();
+    let far: Vec<&LatticeLine> = lines.iter().filter(is_doubtful).filter(is_far).collect();
     let is_beside = |line: &LatticeLine| {
         let near: Vec<&LatticeLine> = far.iter().copied().filter(|other| is_near(line, other)).collect();
-        !line.strips.is_empty() && near.len() >= LEAST && (0..2).any(|axis| extent(&near, axis) >= LONG)
+        near.len() >= LEAST && LatticeLine::extent(near).iter().any(|count| *count >= LONG)
     };
-    (0..lines.len()).filter(|at| is_beside(&lines[*at])).collect()
-}
-
-/// Returns the number of columns (0) or rows (1) over which lines extend.
-fn extent(lines: &[&LatticeLine], axis: usize) -> u32 {
-    let places = || lines.iter().map(|line| line.place[axis]);
-    places().max().zip(places().min()).map_or(0, |(last, first)| last - first)
+    (0..lines.len()).filter(|at| is_doubtful(&&lines[*at]) && is_beside(&lines[*at])).collect()
 }
 
 /// Counts the lines before and behind a line, along the columns and along the rows.

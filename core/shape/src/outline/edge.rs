@@ -168,10 +168,7 @@ pub(super) fn fit_all(mut edges: [EdgeData; 4], sampling: Sampling) -> Result<[E
 /// that its position between them is practically random.
 fn is_dithered(lines: &[LatticeLine], base: impl Fn(f64) -> f64, step: f64) -> bool {
     let on_it = lines.iter().filter(|l| l.is_near(base(l.along), step));
-    let (low, high) = on_it.fold(([u32::MAX; 2], [0; 2]), |(low, high), l| {
-        ([0, 1].map(|k| low[k].min(l.place[k])), [0, 1].map(|k| high[k].max(l.place[k])))
-    });
-    [0, 1].into_iter().all(|k| high[k].saturating_sub(low[k]) >= DITHERED)
+    LatticeLine::extent(on_it).iter().all(|count| *count >= DITHERED)
 }
 
 /// An edge as a curve in its strip.

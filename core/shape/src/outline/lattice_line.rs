@@ -178,6 +178,14 @@ impl LatticeLine {
         }
     }
 
+    /// Returns the numbers of columns and of rows over which lines extend.
+    pub(super) fn extent<'a>(lines: impl IntoIterator<Item = &'a Self>) -> [u32; 2] {
+        let (low, high) = lines.into_iter().fold(([u32::MAX; 2], [0; 2]), |(low, high), line| {
+            ([0, 1].map(|k| low[k].min(line.place[k])), [0, 1].map(|k| high[k].max(line.place[k])))
+        });
+        [0, 1].map(|k| high[k].saturating_sub(low[k]))
+    }
+
     /// Returns true when the plate ends here in front of a background, its side face is hidden and every cell up to the
     /// background was measured. Such lines serve to estimate the footprint.
     pub(super) fn shows_footprint(&self) -> bool {
