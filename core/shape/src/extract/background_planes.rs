@@ -11,7 +11,8 @@
 //! **Method.**
 //!
 //! - A plane n . x = 1 has the inverse range n . d along the unit direction d. This is linear in n, so that a plane is
-//!   fitted by linear least squares at any incidence.
+//!   fitted by linear least squares at any incidence. A plane through three cells is refined by fits to the cells near
+//!   it (locally optimised RANSAC: Chum, Matas and Kittler 2003).
 //! - A cell on a plane is not a mixed pixel, whatever the ranges of its neighbours. There are two exceptions. About one
 //!   mixed pixel in a hundred has the range of a plane by chance (more before a plane whose continuation is close
 //!   behind the edge): a mixed pixel stays mixed if it is alone on a plane that holds few of them. It also stays mixed

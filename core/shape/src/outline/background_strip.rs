@@ -6,12 +6,12 @@
 //! wide: such a strip tapers off and continues, narrower than a beam, beyond the last line that ends on it. Lines of
 //! other edges count too, since a strip may continue around a corner.
 //!
-//! In: the lattice lines of the edges, and the planes between face and background along each line
-//! (`extract/background_planes`). Out: the lines beside a strip. Own.
-//!
 //! Where no beam lies fully on the strip over more than [`REACH`] columns or rows, two signs of it are left once the edge
 //! is fitted (`edge`): a footprint far larger than that of the other edges, and mixed pixels farther outside of the edge
 //! than a footprint reaches.
+//!
+//! In: the lattice lines of the edges, and the planes between face and background along each line
+//! (`extract/background_planes`). Out: the lines beside a strip. Own.
 //!
 //! Limit: a strip so narrow that it shows neither sign is taken for the background behind it.
 
@@ -51,7 +51,7 @@ pub(super) fn shown(edges: [&[LatticeLine]; 4]) -> [Vec<usize>; 4] {
 /// Returns the numbers of the lines of an edge that are near mixed pixels which do not see it: such pixels lie farther
 /// outside than a footprint reaches, and therefore see the far edge of a strip. `edge` is the edge as fitted to all
 /// lines, `footprint` half the angle that a beam sees, radians.
-pub(super) fn contradicting(lines: &[LatticeLine], edge: impl Fn(f64) -> f64, footprint: f64) -> Vec<usize> {
+pub(super) fn near_far_edges(lines: &[LatticeLine], edge: impl Fn(f64) -> f64, footprint: f64) -> Vec<usize> {
     let is_far = |line: &&LatticeLine| {
         let least = edge(line.along) - OUTSIDE * footprint * line.per_radian;
         line.tells_contrast() && line.mixed.is_some_and(|(at, _)| at < least)
@@ -133,7 +133,7 @@ mod tests {
                 line
             };
             let lines: Vec<LatticeLine> = (0..300).map(line).collect();
-            contradicting(&lines, |_| 0.0, 1.6e-4)
+            near_far_edges(&lines, |_| 0.0, 1.6e-4)
         };
         // Those within 48 columns of all three.
         assert_eq!(doubted(100..112), (60..149).collect::<Vec<usize>>());

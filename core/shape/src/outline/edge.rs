@@ -148,7 +148,7 @@ pub(super) fn fit_all(mut edges: [EdgeData; 4], sampling: Sampling) -> Result<[E
             data.take_for_strip(0..data.lines.len(), sampling);
         } else if let Some(edge) = edge {
             let at = |along| edge.posterior.curve.at(along);
-            let lines = background_strip::contradicting(&data.lines, at, edge.footprint);
+            let lines = background_strip::near_far_edges(&data.lines, at, edge.footprint);
             data.take_for_strip(lines, sampling);
         }
     }
