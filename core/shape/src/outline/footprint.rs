@@ -84,7 +84,7 @@ pub(super) fn at_edge(
 ) -> (f64, f64) {
     /// Steps to each side and their size, in parts of `all`: coarse ones first, then finer ones about the best.
     const SEARCH: [(i32, f64); 2] = [(5, 0.16), (7, 0.02)];
-    /// Lines whose likelihoods are multiplied before a logarithm is taken: each is above 10^-6.
+    /// Lines whose likelihoods are multiplied before a logarithm is taken: each is above 10^-7.
     const TOGETHER: usize = 16;
     let showing: Vec<Observed> = lines
         .iter()
