@@ -117,7 +117,6 @@ impl MixedCell {
 pub(super) struct Scene<'a> {
     pub(super) window: &'a Window,
     pub(super) noise: &'a Noise,
-    pub(super) background_noise: &'a Noise,
     pub(super) face: &'a [bool],
     pub(super) pixels: &'a [Pixel],
     pub(super) background: &'a Background,
@@ -198,7 +197,6 @@ impl Scene<'_> {
         let strips: PlaneSet = measured.map(cell).into_iter().flat_map(before).collect();
         let is_sure = |pixel: &&MixedCell| !self.background.is_behind(strips, &pixel.cell);
         let (inside, outside) = (on_face(from)?, on_face(to)?);
-        let own = self.noise.at(index);
         let crossing = Crossing {
             sample,
             step: [step.0 as i8, step.1 as i8],
@@ -211,7 +209,6 @@ impl Scene<'_> {
             strips,
             complete: cells.clone().all(|(_, at)| self.pixels[at] != Pixel::Unknown),
             excess: excess as f32,
-            noise: [own, measured.map_or(own, |at| self.background_noise.at(at).min(own))],
             background: measured.and_then(|at| self.background.at(at, self.beside(index, step, far + 1))),
             beyond,
         };

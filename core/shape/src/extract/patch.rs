@@ -103,9 +103,6 @@ pub struct Crossing {
     pub complete: bool,
     /// Range of the cell at `outside` minus that of the face's continuation there, metres; 0 without a range.
     pub excess: f32,
-    /// Standard deviations of the range, metres, by which mixed pixels beside the face and beside that cell are
-    /// detected.
-    pub noise: [f32; 2],
     /// Plane of the background on which that cell lies.
     pub background: Option<PlaneBehind>,
     /// Kind of object next to the face.

@@ -275,7 +275,6 @@ mod tests {
                     surely_mixed: None,
                     strips: PlaneSet::default(),
                     excess: 0.0,
-                    noise: [0.0; 2],
                     background: None,
                     beyond,
                 };
