@@ -23,6 +23,8 @@
 //!
 //! Limits: the power of a beam near its rim differs between instruments; a beam with wings is detected as mixed farther
 //! inside.
+//! The jump of the range is that at the first cell beyond the edge. At grazing incidence it is some per cent smaller
+//! than at the mixed pixel, and the contrast of a bright plane comes out too large.
 
 use platen_numerics::median::robust_deviation;
 
