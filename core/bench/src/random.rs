@@ -20,6 +20,7 @@
 //! - a table that is visible in one to two rows beyond the far edges
 //! - a person before the nearest corner
 //! - a beam with power beyond its 1/e^2 width
+//! - a beam of 13 rays
 //!
 //! Several scans of each scene separate bias from scatter ([`repeated`]).
 

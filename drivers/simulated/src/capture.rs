@@ -7,8 +7,8 @@ use platen_scan::{Column, Face, Outcome, ScanEnd, ScanHeader, State, Window};
 use platen_sdk::{Result, ScanReceiver};
 use platen_sim_plate::{Plate, PlateState};
 use platen_sim_scanner::{
-    CellCounts, Cyclic, Faces, INTENSITY_MAX, Instrument, LOWEST_DEG, Scene, SimColumn, SimLattice, SimState,
-    Surroundings, WideErrors, scan, truth_document,
+    Beam, CellCounts, Cyclic, Faces, INTENSITY_MAX, Instrument, LOWEST_DEG, Scene, SimColumn, SimLattice,
+    SimState, Surroundings, WideErrors, scan, truth_document,
 };
 use std::f64::consts::{FRAC_PI_2, TAU};
 use std::ops::ControlFlow;
@@ -205,7 +205,11 @@ fn instrument(options: &Options, lattice: &SimLattice, number: u64) -> Instrumen
         tail_dof: options.tail_dof,
         wide_errors: (options.wide_share > 0.0).then_some(wide_errors),
         footprint: options.footprint_mrad * 1e-3,
-        wings: options.beam_wings,
+        beam: match options.beam.as_str() {
+            "winged" => Beam::Winged,
+            "few rays" => Beam::FewRays,
+            _ => Beam::Truncated,
+        },
         angular_sigma: options.angular_noise_urad * 1e-6,
         dropout: options.dropout,
         cyclic: (options.cyclic_mm > 0.0).then_some(cyclic),

@@ -28,7 +28,7 @@
 //! | `step_deg`, `margin_deg` | angle between cells; scanned margin around the plate |
 //! | `noise_mm`, `tail_dof` | standard deviation of a range at 10 m; degrees of freedom of heavy tails |
 //! | `wide_share`, `wide_factor` | share of the ranges whose standard deviation is larger by a factor |
-//! | `footprint_mrad`, `beam_wings` | width of the beam; whether it has power beyond this width |
+//! | `footprint_mrad`, `beam` | width of the beam; its cross section |
 //! | `dropout`, `cyclic_mm`, `angular_noise_urad` | further errors |
 //! | `back_face_from_deg`, `collimation_urad` | start of the back face; collimation error between the faces |
 //! | `warm_up_columns` | columns measured before the laser is warm |
@@ -89,8 +89,8 @@ options! {
         wide_factor: f64 = 4.0, min 1.0, max 100.0;
         /// Full width of the beam at 1/e^2 of its intensity.
         footprint_mrad: f64 = 0.3, unit "mrad", min 0.0, max 5.0;
-        /// Whether the beam has power beyond that width.
-        beam_wings: bool = false;
+        /// Cross section of the beam: a Gaussian truncated at that width, one with power beyond it, or 13 rays.
+        beam: String = "truncated", choices ["truncated", "winged", "few rays"];
         /// Probability that an echo is lost.
         dropout: f64 = 0.006, min 0.0, max 1.0;
         /// Amplitude of the cyclic range error, period 1.2 m.

@@ -28,7 +28,7 @@ fn options() -> Options {
         wide_share: 0.0,
         wide_factor: 4.0,
         footprint_mrad: 0.3,
-        beam_wings: false,
+        beam: "truncated".into(),
         dropout: 0.006,
         cyclic_mm: 0.0,
         angular_noise_urad: 0.0,

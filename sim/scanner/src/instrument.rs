@@ -1,5 +1,6 @@
 //! Error model of the scanner: range noise, mixed pixels, lost echoes, cyclic and two-face errors, warm-up.
 
+use crate::beam::Beam;
 use crate::ray::{Hit, Label};
 
 /// Parameters of the error model. Lengths in metres, angles in radians.
@@ -14,9 +15,8 @@ pub struct Instrument {
     pub wide_errors: Option<WideErrors>,
     /// Full angular width of the beam at 1/e^2 of its intensity.
     pub footprint: f64,
-    /// Whether the beam has power beyond that width, to one and a half of it. Only cells next to an edge of the scene
-    /// are mixed, whatever the step.
-    pub wings: bool,
+    /// Cross section of the beam.
+    pub beam: Beam,
     /// Standard deviation of each reported angle against the true direction of the beam.
     pub angular_sigma: f64,
     /// Probability that any echo is lost.
@@ -80,7 +80,7 @@ impl Default for Instrument {
             tail_dof: None,
             wide_errors: None,
             footprint: 0.3e-3,
-            wings: false,
+            beam: Beam::Truncated,
             angular_sigma: 0.0,
             dropout: 0.006,
             cyclic: None,

@@ -25,6 +25,7 @@
 //!
 //! Frame: the scanner's, right-handed, z up; metres, radians. No code is shared with the product.
 
+mod beam;
 mod bounds;
 mod column;
 mod device;
@@ -41,6 +42,7 @@ pub mod stream;
 mod surroundings;
 mod truth;
 
+pub use beam::Beam;
 pub use column::{SimColumn, SimState, TruthCell};
 pub use device::{Device, DeviceError};
 pub use files::{E57Encoding, FileError, FileFormat, FileOrder, SimScan};

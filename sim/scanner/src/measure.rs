@@ -1,5 +1,6 @@
 //! Measurement of columns: rays of the lattice, echoes of the footprint, errors of the receiver.
 
+use crate::beam::{BeamRay, RIM};
 use crate::column::{SimColumn, SimState, TruthCell};
 use crate::instrument::Instrument;
 use crate::lattice::{SimLattice, unit};
@@ -9,7 +10,6 @@ use platen_sim_plate::Vec3;
 use rand_distr::{Distribution, StandardNormal, StudentT};
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::RngCore;
-use std::sync::LazyLock;
 
 /// Range difference of neighbouring cells of one object that is treated as an edge, metres.
 const RANGE_JUMP: f64 = 0.1;
@@ -130,7 +130,7 @@ impl View<'_> {
         for row in 0..n {
             let neighbours = [before, Some(here), after].into_iter().flatten();
             let echo = if is_at_edge(row, here, neighbours) && self.instrument.footprint > 0.0 {
-                self.footprint_echo(&here.rays[row], here.hits[row], turned(column, row))
+                self.footprint_echo(&here.rays[row], here.hits[row], self.instrument.beam.turned(column, row))
             } else {
                 here.hits[row].map(|hit| self.echo(&hit))
             };
@@ -154,20 +154,20 @@ impl View<'_> {
     }
 
     /// Returns the echo of the whole footprint. A phase scanner integrates the echoes of the whole spot: the range is
-    /// the mean, weighted by power, which falls with the square of the distance. The samples of the spot are turned by
-    /// an angle. If the rim of the spot and the middle ray lie on one surface, the echo is that of the middle ray.
+    /// the mean, weighted by power, which falls with the square of the distance. The rays of the spot are turned by an
+    /// angle. If the rim of the spot and the middle ray lie on one surface, the echo is that of the middle ray.
     fn footprint_echo(&self, ray: &Ray, middle: Option<Hit>, turned: f64) -> Option<Echo> {
         let level = ray.direction.cross(&Vec3::z()).try_normalize(1e-9).unwrap_or(Vec3::x());
         let upright = level.cross(&ray.direction);
         let (sin, cos) = turned.sin_cos();
         let (across, up) = (level * cos + upright * sin, upright * cos - level * sin);
-        let spot = if self.instrument.wings { &WINGED_SPOT } else { &SPOT };
+        let spot = self.instrument.beam.rays();
         let radius = self.instrument.footprint / 2.0;
-        let cast = |(x, y, _): &Sample| {
+        let cast = |(x, y, _): &BeamRay| {
             let direction = (ray.direction + across * (x * radius) + up * (y * radius)).normalize();
             self.cast(&Ray { origin: ray.origin, direction })
         };
-        let (inner, rim) = spot.split_at(SAMPLES - RIM);
+        let (inner, rim) = spot.split_at(spot.len() - RIM);
         let rim: [Option<Hit>; RIM] = std::array::from_fn(|k| cast(&rim[k]));
         if rim.iter().all(|hit| is_one_surface(&middle, hit, MIXED_SPREAD)) {
             return middle.map(|hit| self.echo(&hit));
@@ -246,43 +246,6 @@ struct Echo {
     mixed: bool,
 }
 
-/// Sample of the spot: x, y in units of its 1/e^2 radius, weight of a Gaussian beam.
-type Sample = (f64, f64, f64);
-
-/// Samples of a beam.
-const SAMPLES: usize = 61;
-
-/// The outermost samples, whose convex hull holds all others: a straight edge that divides the samples divides these.
-/// For speed only: `platen demo`.
-const RIM: usize = 13;
-
-/// Radius at which a beam with wings is truncated, in 1/e^2 radii: 1 % of the power lies beyond.
-const WINGED_RADIUS: f64 = 1.5;
-
-/// Gaussian beam truncated at its 1/e^2 radius.
-static SPOT: LazyLock<[Sample; SAMPLES]> = LazyLock::new(|| gaussian_beam(1.0));
-
-/// Gaussian beam with wings.
-static WINGED_SPOT: LazyLock<[Sample; SAMPLES]> = LazyLock::new(|| gaussian_beam(WINGED_RADIUS));
-
-/// Samples a Gaussian beam truncated at a radius in equal areas on Vogel's spiral (1979). No two samples have the same
-/// distance from an edge, so the power beyond the edge changes in small steps, whatever its direction.
-fn gaussian_beam(truncated: f64) -> [Sample; SAMPLES] {
-    let golden_angle = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
-    std::array::from_fn(|k| {
-        let radius = truncated * ((k as f64 + 0.5) / SAMPLES as f64).sqrt();
-        let (sin, cos) = (golden_angle * k as f64).sin_cos();
-        (radius * cos, radius * sin, (-2.0 * radius * radius).exp())
-    })
-}
-
-/// Returns the angle by which the samples of a cell's beam are turned. It differs from cell to cell, so that the steps
-/// do not add up along an edge.
-fn turned(column: u32, row: usize) -> f64 {
-    let part = 0.618_033_988_749_895 * row as f64 + 0.414_213_562_373_095 * f64::from(column);
-    std::f64::consts::TAU * part.fract()
-}
-
 /// Returns true when one of the eight neighbours lies on another object or across a range jump.
 fn is_at_edge<'a>(row: usize, here: &Trace, columns: impl Iterator<Item = &'a Trace>) -> bool {
     let differs = |other: &Option<Hit>| !is_one_surface(&here.hits[row], other, RANGE_JUMP);
@@ -302,56 +265,4 @@ fn is_one_surface(a: &Option<Hit>, b: &Option<Hit>, jump: f64) -> bool {
 /// Draws a uniform deviate in [0, 1).
 fn unit_interval(rng: &mut Pcg64) -> f64 {
     (rng.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Returns the part of the power of a truncated Gaussian beam beyond a line `off` its middle, by strips of equal
-    /// width.
-    fn beyond(truncated: f64, off: f64) -> f64 {
-        const STRIPS: i32 = 400;
-        let width = 2.0 * truncated / f64::from(STRIPS);
-        let place = |k: i32| (f64::from(k) + 0.5) * width - truncated;
-        let strip = |x: f64| {
-            let inside = (0..STRIPS).map(place).filter(|y| x * x + y * y < truncated * truncated);
-            inside.map(|y| (-2.0 * (x * x + y * y)).exp()).sum::<f64>()
-        };
-        let sum = |from: f64| (0..STRIPS).map(place).filter(|x| *x > from).map(strip).sum::<f64>();
-        sum(off) / sum(-truncated)
-    }
-
-    #[test]
-    fn the_rim_reaches_farthest_in_every_direction() {
-        for angle in (0..720).map(|k| f64::from(k).to_radians() / 2.0) {
-            let reach = |(x, y, _): &Sample| x * angle.cos() + y * angle.sin();
-            let farthest = |samples: &[Sample]| samples.iter().map(reach).fold(f64::NEG_INFINITY, f64::max);
-            let (inner, rim) = SPOT.split_at(SAMPLES - RIM);
-            assert!(farthest(inner) < farthest(rim), "{angle}");
-        }
-    }
-
-    /// In each direction: the largest error of one beam, and the mean error of a hundred turned ones.
-    #[test]
-    fn the_power_beyond_an_edge_is_that_of_a_gaussian_beam() {
-        let offs: Vec<f64> = (-9..=9).map(|k| 0.1 * f64::from(k)).collect();
-        for (spot, truncated) in [(&SPOT, 1.0), (&WINGED_SPOT, WINGED_RADIUS)] {
-            let whole: f64 = spot.iter().map(|(_, _, weight)| weight).sum();
-            let (mut most, mut mean) = (0.0_f64, 0.0_f64);
-            for off in offs.iter().map(|off| off * truncated) {
-                let exact = beyond(truncated, off);
-                let error = |row: usize| {
-                    let (sin, cos) = turned(7, row).sin_cos();
-                    let is_beyond = |(x, y, _): &&Sample| x * cos + y * sin > off;
-                    let power: f64 = spot.iter().filter(is_beyond).map(|(_, _, weight)| weight).sum();
-                    power / whole - exact
-                };
-                most = (0..100).map(error).fold(most, |most, error| most.max(error.abs()));
-                mean = mean.max((0..100).map(error).sum::<f64>().abs() / 100.0);
-            }
-            println!("truncated at {truncated}: {most:.3} at most, {mean:.4} in the mean");
-            assert!(most < 0.1 && mean < 0.005, "{most} {mean}");
-        }
-    }
 }

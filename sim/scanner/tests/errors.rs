@@ -3,7 +3,7 @@
 
 use platen_sim_plate::{Plate, PlateState, Pose, Vec3};
 use platen_sim_scanner::{
-    Cyclic, Faces, Instrument, Label, Scene, SimColumn, SimLattice, SimState, Solid, WideErrors, scan,
+    Beam, Cyclic, Faces, Instrument, Label, Scene, SimColumn, SimLattice, SimState, Solid, WideErrors, scan,
     scan_all,
 };
 use std::ops::ControlFlow;
@@ -177,7 +177,7 @@ fn angular_noise_shows_as_range_noise_on_a_tilted_plate() {
 #[test]
 fn ranges_mix_where_the_footprint_straddles_an_edge() {
     // Azimuths beyond the spot see one surface only.
-    let cells = at_an_edge(0.005, false);
+    let cells = at_an_edge(0.005, Beam::Truncated);
     assert!(cells.iter().all(|(azimuth, mixed)| !mixed || *azimuth < 0.21e-3));
     let mixed = cells.iter().filter(|(_, mixed)| *mixed).count();
     assert!(mixed > 500, "{mixed}");
@@ -187,23 +187,23 @@ fn ranges_mix_where_the_footprint_straddles_an_edge() {
 fn a_beam_with_wings_mixes_beyond_its_width() {
     // The columns on both sides of the one at the edge are 0.22 mrad from it, 1.1 of the beam's radii; one of them has
     // a neighbour on the other surface.
-    let mixed = |wings: bool| {
-        let cells = at_an_edge(0.0125, wings);
+    let mixed = |beam: Beam| {
+        let cells = at_an_edge(0.0125, beam);
         let beside = cells.into_iter().filter(|(azimuth, _)| (0.21e-3..0.23e-3).contains(azimuth));
         beside.filter(|(_, mixed)| *mixed).count()
     };
-    assert!(mixed(true) > 50, "{}", mixed(true));
-    assert_eq!(mixed(false), 0);
+    assert!(mixed(Beam::Winged) > 50, "{}", mixed(Beam::Winged));
+    assert_eq!(mixed(Beam::Truncated), 0);
 }
 
 /// Scans a board's edge at y = 0, 3 m before a wall, with a beam of 0.2 mrad to each side. Returns for each cell its
 /// distance from the edge, radians, and whether both surfaces are mixed, which is also visible in its range.
-fn at_an_edge(step_deg: f64, wings: bool) -> Vec<(f64, bool)> {
+fn at_an_edge(step_deg: f64, beam: Beam) -> Vec<(f64, bool)> {
     let board = Solid::upright(Vec3::new(7.0, 1.0, 0.0), Vec3::new(0.02, 2.0, 2.0), 0.0);
     let wall = Solid::upright(Vec3::new(10.1, 0.0, 0.0), Vec3::new(0.2, 4.0, 4.0), 0.0);
     let scene = Scene::of(None, vec![(Label::Cabinet, board), (Label::Wall, wall)]);
     let instrument =
-        Instrument { footprint: 0.4e-3, wings, range_sigma: 0.0, dropout: 0.0, ..Instrument::default() };
+        Instrument { footprint: 0.4e-3, beam, range_sigma: 0.0, dropout: 0.0, ..Instrument::default() };
     let cell = |column: &SimColumn, i: usize| {
         let (range, mixed) = (f64::from(column.range_m[i]), column.truth[i].mixed);
         assert!(

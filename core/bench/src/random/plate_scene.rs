@@ -48,8 +48,8 @@ pub(super) struct RandomScene {
     tails: [f64; 2],
     /// Angle by which the table is visible beyond the far edges, degrees; 0: a wide table.
     strip_deg: f64,
-    /// Whether the beam has power beyond its 1/e^2 width.
-    wings: bool,
+    /// Cross section of the beam, as the driver names it.
+    beam: &'static str,
     pub(super) setting: Setting,
     reflectivity: f64,
     /// Height of the scanner above that of the simulator's shop, metres.
@@ -150,19 +150,12 @@ impl RandomScene {
         // From a separate generator, so that scenes equal those of versions that did not draw this value.
         let drawn = dark * (bright / dark).powf(Rng::with_seed(!seed).f64());
         let reflectivity = given.reflectivity.unwrap_or(drawn);
-        let wings = family == Family::Wings;
-        Self {
-            scene,
-            target,
-            tails,
-            strip_deg,
-            wings,
-            setting,
-            reflectivity,
-            scanner_m,
-            cyclic_mm,
-            hidden_by,
-        }
+        let beam = match family {
+            Family::Wings => "winged",
+            Family::Rays => "few rays",
+            _ => "truncated",
+        };
+        Self { scene, target, tails, strip_deg, beam, setting, reflectivity, scanner_m, cyclic_mm, hidden_by }
     }
 
     /// Returns the scene for repeated scan `number`, 0 being the scene itself: with other noise, the plate moved by up
@@ -188,7 +181,7 @@ impl RandomScene {
             ("wide_factor", Value::Float(self.tails[1])),
             ("plate_reflectivity", Value::Float(self.reflectivity)),
             ("strip_deg", Value::Float(self.strip_deg)),
-            ("beam_wings", Value::Bool(self.wings)),
+            ("beam", Value::String(self.beam.to_owned())),
             ("hidden_by", Value::String(self.hidden_by.to_owned())),
         ];
         self.scene.scan(catalogue, folder, self.setting, &more)

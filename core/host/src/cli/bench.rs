@@ -46,6 +46,8 @@ pub enum Family {
     Hidden,
     /// The beam has power beyond its 1/e^2 width, to one and a half of it
     Wings,
+    /// The beam consists of 13 rays, so that the mixing goes in steps
+    Rays,
 }
 
 /// A lattice of the part `scale`.
