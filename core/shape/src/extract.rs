@@ -54,7 +54,7 @@ use column_store::{Cell, ColumnStore, Segment, StoredColumn, cells_of};
 use completed_components::Completed;
 use connected_components::{Components, Run};
 use continuity::Continuity;
-pub(crate) use mixed_pixels::DETECTION_LIMIT;
+pub(crate) use mixed_pixels::detection_limit;
 use occlusion::FacePiece;
 pub use patch::{Beyond, Crossing, MixedPixels, Patch, PlaneBehind, PlaneSet, Sample};
 pub use refusal::Refusal;
@@ -292,7 +292,16 @@ impl Extractor {
     }
 
     fn patch(&self, surface: &SegmentedComponent, regions: &[Vec<bool>]) -> Result<Patch, Refusal> {
-        let SegmentedComponent { window, noise, pixels, background, slope_reach, normals, .. } = surface;
+        let SegmentedComponent {
+            window,
+            noise,
+            background_noise,
+            pixels,
+            background,
+            slope_reach,
+            normals,
+            ..
+        } = surface;
         let mut face = vec![false; window.cells.len()];
         for region in regions {
             for (cell, core) in face.iter_mut().zip(region_growing::erode(window, region, *slope_reach)) {
@@ -317,6 +326,7 @@ impl Extractor {
         let scene = crossings::Scene {
             window,
             noise,
+            background_noise,
             face: &face,
             pixels,
             background,

@@ -32,6 +32,7 @@
 //! Limits: four smooth edges that meet at 60 to 120 degrees; no hole that reaches an edge.
 
 mod background_strip;
+mod beam_shape;
 mod boundary_loop;
 mod contrast;
 mod corners;

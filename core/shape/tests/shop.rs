@@ -10,7 +10,7 @@ use platen_scan::{Column, ScanHeader};
 use platen_shape::extract::{Extractor, Refusal};
 use platen_shape::outline::outline;
 use platen_shape::{Outline, Patch, PlateSpec, RegionOfInterest, Vec3};
-use synthetic::{Plate, Scene};
+use synthetic::{Plate, Receiver, Scene};
 
 fn plate() -> Plate {
     Plate::rolled()
@@ -209,6 +209,31 @@ fn bent_along_the_line_of_sight() {
         ..plate()
     };
     check("grazing", &Scene { step: 0.035_f64.to_radians(), ..Scene::of(plate) }, 2e-3);
+}
+
+/// At grazing incidence the continuation of the face recedes from cell to cell, the floor behind it less: the jump of
+/// the range one cell farther out is not that along the beam of a mixed pixel.
+#[test]
+fn the_jump_is_that_along_the_beam_of_the_mixed_pixel() {
+    let plate = Plate { radius: None, turn: 0.0, tilt: -0.15, centre: Vec3::new(7.0, 0.0, -3.0), ..plate() };
+    let scene = Scene { floor: -3.4, receiver: Receiver::Linear { plates: 1.0 }, ..Scene::of(plate) };
+    let (header, columns) = scene.scan();
+    let patch = extract(&header, &columns, &scene.spec()).unwrap();
+    let (mut of_pixel, mut one_farther) = (Vec::new(), Vec::new());
+    // Farther out the continuation of the face is not evaluated.
+    for crossing in patch.crossings.iter().filter(|crossing| crossing.cells <= 3) {
+        let Some((pixels, jump)) = crossing.mixed.and_then(|pixels| Some((pixels, pixels.jump?))) else {
+            continue;
+        };
+        let on_face = pixels.ends[0];
+        let to_floor = on_face.norm() * (scene.floor / on_face.z - 1.0);
+        of_pixel.push((f64::from(jump) / to_floor - 1.0).abs());
+        one_farther.push((f64::from(crossing.excess) / to_floor - 1.0).abs());
+    }
+    let most = |off: &[f64]| off.iter().copied().fold(0.0, f64::max);
+    let [of_pixel, one_farther] = [most(&of_pixel), most(&one_farther)];
+    println!("jump off by at most {of_pixel:.6}, one cell farther by {one_farther:.4}");
+    assert!(of_pixel < 1e-4 && one_farther > 0.02);
 }
 
 #[test]

@@ -2,7 +2,13 @@
 //! the samples.
 //!
 //! A sample is one random draw of the noise and of the position of the lattice on the edges. It is therefore compared
-//! with the range of many draws: its figures must lie within that range, widened by a factor on both sides.
+//! with the range of many draws: its figures must lie within that range, widened by [`FACTOR`] on both sides.
+//!
+//! Beams and brightness must be those of the samples, since they bias the edges: a beam of a few rays before a floor
+//! darker than the plate moves an edge by up to a tenth of the beam's radius. Both were read from the mixed pixels of
+//! the half-bent plate, whose truth is known: their ranges take ten values, and the two sides of the beam have the same
+//! power at odds of exp(-1.05). With the simulator's own beam and mill scale the samples are up to 1.6 times as far off
+//! as the worst of our draws.
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -21,10 +27,17 @@ use serde_json::Value as Json;
 
 type Vec3 = Vector3<f64>;
 
+/// Factor by which the range of our draws is widened: no sample is outside of the range itself.
+const FACTOR: f64 = 1.15;
 /// Scans of each scene by our simulator.
 const SEEDS: u64 = 10;
 /// Largest shift of the plate from seed to seed, millimetres: more than a lattice step.
 const SHIFT_MM: f64 = 15.0;
+/// Reflectivity of the samples' plates beside the floor of our simulator, 0.3: their floor returns exp(-1.05) of what
+/// the plate returns at the same incidence, according to the mixed pixels of the half-bent plate.
+const REFLECTIVITY: f64 = 0.857;
+/// Factor of the range noise that makes up for this brighter plate: the noise on the plate is that of the samples.
+const MORE_NOISE: f64 = 1.37;
 const LIMIT: Duration = Duration::from_secs(120);
 
 struct Sample {
@@ -133,8 +146,10 @@ impl Lab {
             ("truth_file", Value::Path(truth.clone())),
             ("step_deg", Value::Float(sample.number("/lattice/step_deg"))),
             ("margin_deg", Value::Float(3.0)),
-            ("noise_mm", Value::Float(sample.number("/scanner/sigma_mm"))),
+            ("plate_reflectivity", Value::Float(REFLECTIVITY)),
+            ("noise_mm", Value::Float(MORE_NOISE * sample.number("/scanner/sigma_mm"))),
             ("footprint_mrad", Value::Float(1000.0 * sample.number("/scanner/footprint_rad"))),
+            ("beam", Value::String("few rays".into())),
             ("warm_up_columns", Value::Int(0)),
             ("seed", Value::Int(i64::try_from(seed).unwrap())),
         ];
@@ -144,9 +159,8 @@ impl Lab {
     }
 }
 
-/// Checks a scene; the range is widened by `factor`. Figures of markers up to `no_judge_mm` are within the uncertainty
-/// of the sample's own truth and are not judged.
-fn check(name: &str, shape: &'static str, factor: f64, no_judge_mm: f64) {
+/// Checks a scene.
+fn check(name: &str, shape: &'static str) {
     let samples: Vec<Sample> = samples::each(&format!("plates/{name}"))
         .into_iter()
         .map(|folder| Sample::open(folder, shape))
@@ -167,9 +181,8 @@ fn check(name: &str, shape: &'static str, factor: f64, no_judge_mm: f64) {
                 sample.folder.display(),
                 theirs[k]
             );
-            let in_doubt = k == 1 && theirs[k].max(most) <= no_judge_mm;
             assert!(
-                in_doubt || (least / factor..=most * factor).contains(&theirs[k]),
+                (least / FACTOR..=most * FACTOR).contains(&theirs[k]),
                 "{name}: {what} of the sample {} mm, ours {least} to {most} mm",
                 theirs[k]
             );
@@ -179,15 +192,12 @@ fn check(name: &str, shape: &'static str, factor: f64, no_judge_mm: f64) {
 
 #[test]
 fn p1_cylinder() {
-    check("p1_cylinder", "shape = \"cylinder\"\nradius_mm = 9000.0\naxis_deg = 110.0", 1.5, 0.0);
+    check("p1_cylinder", "shape = \"cylinder\"\nradius_mm = 9000.0\naxis_deg = 110.0");
 }
 
 #[test]
 fn p2_sphere() {
-    // According to the samples' document its map follows one material law, and below 0.2 mm it cannot be used to judge
-    // others. Its corners (0.25 mm) are farther off than ours (0.10 to 0.15 mm), within the uncertainty stated for them
-    // (0.36 to 0.61 mm).
-    check("p2_sphere", "shape = \"sphere\"\nradius_mm = 11000.0", 1.75, 0.2);
+    check("p2_sphere", "shape = \"sphere\"\nradius_mm = 11000.0");
 }
 
 #[test]
@@ -196,7 +206,5 @@ fn p3_half_bent() {
         "p3_half_bent",
         "shape = \"steps\"\naxis_deg = 90.0\ncurvature_per_m = 0.16666666666666666\n\
          steps = [{ at_mm = 100.0, width_mm = 300.0, change_per_m = -0.16666666666666666 }]",
-        1.5,
-        0.0,
     );
 }

@@ -98,6 +98,12 @@ impl Background {
         Some(PlaneBehind { number, distance: (1.0 / vector.norm()) as f32, narrow })
     }
 
+    /// Returns the range of a plane along the beam of a cell, metres. `None` where the beam does not meet it.
+    pub(super) fn range(&self, plane: &PlaneBehind, cell: &BackgroundCell) -> Option<f64> {
+        let inverse = self.planes[usize::from(plane.number)].vector.dot(&cell.direction);
+        (inverse > 0.0).then(|| 1.0 / inverse)
+    }
+
     /// Returns the numbers of the flat planes that, if they extend so far, are in front of the background cell `behind`
     /// and behind `place`, a place on the beam of another cell.
     pub(super) fn between(&self, place: BackgroundCell, behind: BackgroundCell) -> impl Iterator<Item = u8> {

@@ -97,6 +97,8 @@ struct MixedCell {
     on_face: Vec3,
     /// Its range minus that of the continuation, metres.
     excess: f32,
+    /// Range of the background's plane along its beam minus that of the continuation, metres.
+    jump: Option<f32>,
 }
 
 impl MixedCell {
@@ -109,7 +111,7 @@ impl MixedCell {
     fn joined<'a>(mut pixels: impl DoubleEndedIterator<Item = &'a Self>) -> Option<MixedPixels> {
         let near = pixels.next()?;
         let far = pixels.next_back().unwrap_or(near);
-        Some(MixedPixels { ends: [near.on_face, far.on_face], excess: near.excess })
+        Some(MixedPixels { ends: [near.on_face, far.on_face], excess: near.excess, jump: near.jump })
     }
 }
 
@@ -117,6 +119,7 @@ impl MixedCell {
 pub(super) struct Scene<'a> {
     pub(super) window: &'a Window,
     pub(super) noise: &'a Noise,
+    pub(super) background_noise: &'a Noise,
     pub(super) face: &'a [bool],
     pub(super) pixels: &'a [Pixel],
     pub(super) background: &'a Background,
@@ -187,9 +190,13 @@ impl Scene<'_> {
         }
         let cells = (1..=far).filter_map(|k| self.beside(index, step, k).map(|at| (k, at)));
         let cell = |at| BackgroundCell::of(self.window, self.noise, at);
+        let background = measured.and_then(|at| self.background.at(at, self.beside(index, step, far + 1)));
         let mixed_cell = |(far, at): (usize, usize)| {
-            let excess = self.excess(fit, at, far.min(FIT_FAR), index, step)? as f32;
-            Some(MixedCell { cell: cell(at), on_face: on_face(far as f64)?.point, excess })
+            let excess = self.excess(fit, at, far.min(FIT_FAR), index, step)?;
+            let cell = cell(at);
+            let range = background.and_then(|plane| self.background.range(&plane, &cell));
+            let jump = range.map(|range| (excess + range - f64::from(self.window.cells[at].range_m)) as f32);
+            Some(MixedCell { cell, on_face: on_face(far as f64)?.point, excess: excess as f32, jump })
         };
         let mixed = cells.clone().filter(|(_, at)| self.pixels[*at] == Pixel::Mixed);
         let mixed = mixed.map(mixed_cell).collect::<Option<Vec<_>>>()?;
@@ -197,6 +204,7 @@ impl Scene<'_> {
         let strips: PlaneSet = measured.map(cell).into_iter().flat_map(before).collect();
         let is_sure = |pixel: &&MixedCell| !self.background.is_behind(strips, &pixel.cell);
         let (inside, outside) = (on_face(from)?, on_face(to)?);
+        let own = self.noise.at(index);
         let crossing = Crossing {
             sample,
             step: [step.0 as i8, step.1 as i8],
@@ -209,7 +217,8 @@ impl Scene<'_> {
             strips,
             complete: cells.clone().all(|(_, at)| self.pixels[at] != Pixel::Unknown),
             excess: excess as f32,
-            background: measured.and_then(|at| self.background.at(at, self.beside(index, step, far + 1))),
+            noise: [own, measured.map_or(own, |at| self.background_noise.at(at).min(own))],
+            background,
             beyond,
         };
         Some((crossing, cut))

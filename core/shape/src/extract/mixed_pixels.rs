@@ -16,7 +16,13 @@ const LEAST_SHARE: f32 = 0.002;
 
 /// Detection limit of a mixed pixel beside a surface, in standard deviations of a range: [`BOUND`] times that of a
 /// second difference, rounded.
-pub(crate) const DETECTION_LIMIT: f64 = 12.0;
+pub(super) const DETECTION_LIMIT: f64 = 12.0;
+
+/// Returns the least part of the jump between two surfaces, metres, by which a mixed pixel must differ from one of them
+/// to be detected. `noise` is the standard deviation of the ranges on it, metres.
+pub(crate) fn detection_limit(noise: f64, jump: f64) -> f64 {
+    (DETECTION_LIMIT * noise / jump).max(f64::from(LEAST_SHARE))
+}
 
 /// Steepest surface, metres of range per metre across the beam: that of an incidence of 85 degrees.
 pub(super) const STEEPEST: f32 = 12.0;

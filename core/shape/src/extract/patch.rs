@@ -75,6 +75,9 @@ pub struct MixedPixels {
     pub ends: [Vec3; 2],
     /// Range of the nearest one minus that of the continuation there, metres.
     pub excess: f32,
+    /// Range of the background's plane along the beam of the nearest one minus that of the continuation there, metres.
+    /// `None` without a plane.
+    pub jump: Option<f32>,
 }
 
 /// Crossing of a row or a column of the lattice with the boundary of the face.
@@ -103,6 +106,9 @@ pub struct Crossing {
     pub complete: bool,
     /// Range of the cell at `outside` minus that of the face's continuation there, metres; 0 without a range.
     pub excess: f32,
+    /// Standard deviations of the range, metres, by which mixed pixels beside the face and beside that cell are
+    /// detected.
+    pub noise: [f32; 2],
     /// Plane of the background on which that cell lies.
     pub background: Option<PlaneBehind>,
     /// Kind of object next to the face.

@@ -15,7 +15,9 @@ pub(super) struct SegmentedComponent {
     /// Root of the component, or of the first of several.
     pub(super) root: u32,
     pub(super) window: Window,
+    /// Noise of the component, and of all else.
     pub(super) noise: Noise,
+    pub(super) background_noise: Noise,
     pub(super) pixels: Vec<Pixel>,
     pub(super) background: Background,
     /// Number of cells on each side over which the normals' slopes are taken.
@@ -28,7 +30,8 @@ pub(super) struct SegmentedComponent {
 impl SegmentedComponent {
     pub(super) fn of(root: u32, window: Window, continuity: &Continuity) -> Self {
         let noise = Noise::estimate(&window, &window.own);
-        let mut pixels = mixed_pixels::classify(&window, &noise, &Noise::of_background(&window));
+        let background_noise = Noise::of_background(&window);
+        let mut pixels = mixed_pixels::classify(&window, &noise, &background_noise);
         let background = background_planes::mark_sound(&window, &noise, &mut pixels);
         let usable: Vec<bool> =
             window.own.iter().zip(&pixels).map(|(own, pixel)| *own && *pixel != Pixel::Mixed).collect();
@@ -36,7 +39,18 @@ impl SegmentedComponent {
         let slope_reach = smoothed_normals::slope_reach(&window, noise.pooled);
         let normals = smoothed_normals::normals(&window, &smooth, &usable, slope_reach);
         let (labels, faces) = faces::find_faces(&window, &normals, slope_reach);
-        Self { root, window, noise, pixels, background, slope_reach, normals, labels, faces }
+        Self {
+            root,
+            window,
+            noise,
+            background_noise,
+            pixels,
+            background,
+            slope_reach,
+            normals,
+            labels,
+            faces,
+        }
     }
 
     /// Returns the faces of at least `least` square metres. `number` is that of this component, for

@@ -275,6 +275,7 @@ mod tests {
                     surely_mixed: None,
                     strips: PlaneSet::default(),
                     excess: 0.0,
+                    noise: [0.0; 2],
                     background: None,
                     beyond,
                 };

@@ -5,8 +5,7 @@
 //!    part of the beam's power beyond the edge, and C the contrast: the echo of the background alone over that of the
 //!    face alone.
 //! 2. **Position in the beam.** Given the contrast, the range of one mixed pixel gives s, and s the position of the
-//!    edge in the beam. The position used is midway between that in a Gaussian beam and that in a beam truncated at its
-//!    radius (1/e^2).
+//!    edge in the beam (`beam_shape`).
 //! 3. **One unknown per plane.** The ratio of the reflectivities is one unknown for each plane of the background and is
 //!    found together with the edge. All mixed pixels before a plane share it; it is determined by those at the ends of
 //!    their row, where the beam sees nearly one side only. Along the plane the contrast follows from it by the cosines
@@ -20,35 +19,23 @@
 //!    detected as mixed farther inside of the edge than outside.
 //!
 //! In: one lattice line. Out: [`Mixing`], for the likelihood of that line. Own.
-//!
-//! Limits: the power of a beam near its rim differs between instruments; a beam with wings is detected as mixed farther
-//! inside.
-//! The jump of the range is that at the first cell beyond the edge. At grazing incidence it is some per cent smaller
-//! than at the mixed pixel, and the contrast of a bright plane comes out too large.
 
 use platen_numerics::median::robust_deviation;
 
+use super::beam_shape::{self, BeamShape};
 use super::edge_likelihood::SharedObservation;
 use super::height_field::LEAST_COSINE;
 use crate::Vec3;
-use crate::extract::{BACKGROUND_PLANES, Beyond, Crossing, DETECTION_LIMIT};
+use crate::extract::{BACKGROUND_PLANES, Beyond, Crossing, detection_limit};
 
-/// Position of an edge in a beam from the log odds l of the power beyond it, in radii: l / (A + B l^2). A Gaussian beam
-/// has A = 3.19 and B = 0.034, a beam truncated at its radius A = 3.52 and B = 0.080 (each within 0.01 up to l = 5).
-/// The values here are midway.
-const PLACE: (f64, f64) = (3.35, 0.057);
-
-/// Standard deviation of that position over l^2: half the difference of the two beam shapes, and the effect of an error
-/// of the radius.
+/// Standard deviation of the position of an edge in a beam over the square of the log odds: what the beam's shape and
+/// radius leave open.
 const PLACE_SPREAD: f64 = 0.01;
 
 /// Least standard deviation of the position by one pixel, in radii: a wrong beam shape shifts all pixels of a row
 /// alike, however little they scatter. With half this value corners of 40 plates of mill scale are up to 2.5 mm off
 /// instead of 1.8 mm.
 const LEAST_SPREAD: f64 = 0.2;
-
-/// Log odds beyond which a pixel gives no further information.
-const MOST_ODDS: f64 = 5.0;
 
 /// Prior of the logarithm of the ratio of the reflectivities of background and plate: mean and standard deviation. It
 /// covers walls of reflectivity 0.8 and floors of 0.3 behind plates of 0.1 to 0.6.
@@ -65,10 +52,10 @@ const LEAST_TOLD: f64 = 1e-3;
 /// expectation has.
 const SCATTER: (f64, f64) = (0.2, 10.0);
 
-/// Largest scatter of a receiver that mixes linearly, in radii: edges of 40 random scenes have 0.05 to 0.23. Ranges
-/// anywhere between the two surfaces give a scatter of 0.48 where all beams have the edge at one place, and more
-/// elsewhere.
-const MOST_SCATTER: f64 = 0.33;
+/// Largest scatter of a receiver that mixes linearly, in radii: edges of 24 random scenes have 0.04 to 0.13. Ranges
+/// anywhere between the two surfaces give a scatter of at least 0.33 where all beams have the edge at one place, and
+/// more elsewhere.
+const MOST_SCATTER: f64 = 0.25;
 
 /// Scatter that stands for pixels without information, in radii.
 pub(super) const NOTHING_TOLD: f64 = 10.0;
@@ -89,7 +76,7 @@ pub(super) struct Contrasts([f64; BACKGROUND_PLANES]);
 impl Contrasts {
     /// Returns true when no edge moves by more than a hundredth of the beam's radius between these and others.
     pub(super) fn are_near(&self, other: &Self) -> bool {
-        self.0.iter().zip(&other.0).all(|(one, other)| (one - other).abs() < 0.01 * PLACE.0)
+        self.0.iter().zip(&other.0).all(|(one, other)| beam_shape::STEEPEST * (one - other).abs() < 0.01)
     }
 
     /// Copies the first logarithms, one for each plane.
@@ -163,15 +150,6 @@ pub(super) fn spread(sizes: Vec<f64>) -> f64 {
     ((n * scatter * scatter + weight * expected * expected) / (n + weight)).sqrt()
 }
 
-/// Returns the position of an edge in a beam, in radii from its middle, from the log odds of the power beyond the edge,
-/// and the derivative by these log odds.
-fn place_in_beam(log_odds: f64) -> (f64, f64) {
-    let (a, b) = PLACE;
-    let l = log_odds.clamp(-MOST_ODDS, MOST_ODDS);
-    let by = a + b * l * l;
-    (l / by, (a - b * l * l) / (by * by))
-}
-
 /// Linear mixing along one lattice line before a background plane.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Mixing {
@@ -179,16 +157,16 @@ pub(super) struct Mixing {
     plane: usize,
     /// Part of the logarithm of the contrast that is due to incidence and range.
     by_geometry: f64,
-    /// Largest log odds of either surface at which a pixel is detected as mixed.
-    most_odds: f64,
+    /// Largest log odds of the face and of the background at which a pixel is detected as mixed.
+    most_odds: [f64; 2],
     /// Logarithm of the odds of the background in a single mixed pixel.
     odds: Option<f64>,
 }
 
 impl Mixing {
     /// Determines the mixing of a crossing. `None` without a background plane, or where not all cells of the crossing
-    /// were measured. `noise` is that of the ranges, metres.
-    pub(super) fn of(crossing: &Crossing, noise: f64) -> Option<Self> {
+    /// were measured.
+    pub(super) fn of(crossing: &Crossing) -> Option<Self> {
         let jump = f64::from(crossing.excess);
         let plane = crossing
             .background
@@ -197,14 +175,15 @@ impl Mixing {
         let on_face = crossing.normal.dot(&-crossing.inside) / range;
         let on_plane = f64::from(plane.distance) / (range + jump);
         let [on_face, on_plane] = [on_face, on_plane].map(|cosine| cosine.max(LEAST_COSINE));
-        let limit = (DETECTION_LIMIT * noise / jump).min(MOST_LIMIT);
+        let limits = crossing.noise.map(|noise| detection_limit(f64::from(noise), jump).min(MOST_LIMIT));
         let is_single = |[near, far]: [Vec3; 2]| near == far && far != crossing.outside;
         let single = crossing.mixed.filter(|pixels| is_single(pixels.ends));
-        let part = single.map(|pixels| f64::from(pixels.excess) / jump);
+        // At grazing incidence the continuation of the face recedes from cell to cell, hence the jump at the pixel.
+        let part = single.and_then(|pixels| Some(f64::from(pixels.excess) / f64::from(pixels.jump?)));
         Some(Self {
             plane: usize::from(plane.number),
             by_geometry: (on_plane / on_face).ln() - 2.0 * (1.0 + jump / range).ln(),
-            most_odds: ((1.0 - limit) / limit).ln(),
+            most_odds: limits.map(|limit| ((1.0 - limit) / limit).ln()),
             odds: part.filter(|part| *part > 0.0 && *part < 1.0).map(|part| (part / (1.0 - part)).ln()),
         })
     }
@@ -216,15 +195,21 @@ impl Mixing {
 
     /// Returns the distances inside and outside of the edge up to which a beam is detected as mixed, in parts of its
     /// radius.
-    pub(super) fn seen(&self, contrasts: &Contrasts) -> [f64; 2] {
+    pub(super) fn seen(&self, shape: BeamShape, contrasts: &Contrasts) -> [f64; 2] {
         let contrast = contrasts.0[self.plane] + self.by_geometry;
-        [self.most_odds + contrast, self.most_odds - contrast]
-            .map(|odds| place_in_beam(odds).0.clamp(LEAST_SEEN, 1.0))
+        let [face, background] = self.most_odds;
+        [face + contrast, background - contrast].map(|odds| shape.place(odds).0.max(LEAST_SEEN))
     }
 
     /// Returns true when a single mixed pixel determines the position of the edge.
     pub(super) fn tells(&self) -> bool {
         self.odds.is_some()
+    }
+
+    /// Returns the position of the edge in the beam of a single mixed pixel, in radii, and the derivative by the log
+    /// odds.
+    pub(super) fn place(&self, shape: BeamShape, contrasts: &Contrasts) -> Option<(f64, f64)> {
+        self.odds.map(|odds| shape.place(odds - self.by_geometry - contrasts.0[self.plane]))
     }
 
     /// Returns the position of the edge by a single mixed pixel at `at`, linearised about these contrasts. `radius` is
@@ -233,34 +218,37 @@ impl Mixing {
         &self,
         at: f64,
         radius: f64,
+        shape: BeamShape,
         contrasts: &Contrasts,
         spread: f64,
     ) -> Option<SharedObservation> {
         let contrast = contrasts.0[self.plane];
-        self.odds.map(|odds| {
-            let log_odds = odds - self.by_geometry - contrast;
-            let (place, slope) = place_in_beam(log_odds);
-            let by_place = PLACE_SPREAD * log_odds * log_odds;
-            SharedObservation {
-                place: at + radius * (place + slope * contrast),
-                soft: radius * (spread * spread + LEAST_SPREAD * LEAST_SPREAD + by_place * by_place).sqrt(),
-                radius,
-                number: self.plane,
-                factor: radius * slope,
-            }
+        let log_odds = self.odds? - self.by_geometry - contrast;
+        let (place, slope) = shape.place(log_odds);
+        let by_place = PLACE_SPREAD * log_odds * log_odds;
+        Some(SharedObservation {
+            place: at + radius * (place + slope * contrast),
+            soft: radius * (spread * spread + LEAST_SPREAD * LEAST_SPREAD + by_place * by_place).sqrt(),
+            radius,
+            number: self.plane,
+            factor: radius * slope,
         })
     }
 }
 
 #[cfg(test)]
 pub(super) mod tests {
-    use platen_numerics::normal_distribution::cdf;
-
+    use super::super::beam_shape::SHAPES;
+    use super::super::beam_shape::tests::power_beyond;
     use super::*;
     use crate::extract::{MixedPixels, PlaneBehind, PlaneSet};
 
     const JUMP: f64 = 2.0;
     const RANGE: f64 = 8.0;
+
+    fn pixels(ends: [Vec3; 2], excess: f64) -> MixedPixels {
+        MixedPixels { ends, excess: excess as f32, jump: Some(JUMP as f32) }
+    }
 
     /// Returns a crossing straight below the scanner, before a plane 2 m behind it; `background` is the part of that
     /// plane in the echo of the mixed pixel.
@@ -273,11 +261,12 @@ pub(super) mod tests {
             inside: at(5e-3),
             outside: at(-5e-3),
             normal: Vec3::z(),
-            mixed: Some(MixedPixels { ends: [at(0.0); 2], excess: (background * JUMP) as f32 }),
+            mixed: Some(pixels([at(0.0); 2], background * JUMP)),
             surely_mixed: None,
             strips: PlaneSet::default(),
             complete: true,
             excess: JUMP as f32,
+            noise: [1e-3; 2],
             background: Some(PlaneBehind { number: 2, distance: (RANGE + JUMP) as f32, narrow: false }),
             beyond: Beyond::Behind,
         }
@@ -285,7 +274,7 @@ pub(super) mod tests {
 
     /// Returns the mixing of a pixel in whose echo both surfaces have the same part.
     pub(crate) fn half() -> Mixing {
-        Mixing::of(&crossing(0.5), 1e-3).unwrap()
+        Mixing::of(&crossing(0.5)).unwrap()
     }
 
     /// Returns the contrasts of planes whose echo is `times` that of the face at the same incidence.
@@ -315,50 +304,47 @@ pub(super) mod tests {
         assert!((of.planes()[1].0 - PRIOR.0).abs() < 1e-12 && (of.planes()[1].1 - PRIOR.1).abs() < 1e-12);
     }
 
-    /// Returns the part of the power of a Gaussian beam truncated at `most` radii beyond a line `off` its middle, by
-    /// strips of equal width.
-    fn beyond(most: f64, off: f64) -> f64 {
-        const STRIPS: i32 = 1000;
-        let strip = |k: i32| {
-            let x = most * (f64::from(2 * k + 1) / f64::from(STRIPS) - 1.0);
-            // Half the chord there, and the power along it.
-            let chord = (most * most - x * x).sqrt();
-            (x, (-2.0 * x * x).exp() * (cdf(2.0 * chord) - 0.5))
-        };
-        let sum = |from: f64| (0..STRIPS).map(strip).filter(|(x, _)| *x > from).map(|(_, p)| p).sum::<f64>();
-        sum(off) / sum(f64::NEG_INFINITY)
-    }
-
     #[test]
-    fn one_mixed_pixel_locates_the_edge_midway_between_a_gaussian_beam_and_a_truncated_one() {
+    fn one_mixed_pixel_locates_the_edge() {
         for times in [0.5, 1.0, 8.0_f64] {
             for edge in [-0.8, -0.3, 0.0, 0.5, 0.8] {
-                let [gaussian, truncated] = [4.0, 1.0].map(|most| {
-                    let beyond = beyond(most, -edge);
-                    let part = times * beyond / (times * beyond + 1.0 - beyond);
-                    let mixing = Mixing::of(&crossing(part), 1e-3).unwrap();
-                    let found = mixing.edge(0.0, 1.0, &contrasts(times), 0.2).unwrap();
-                    let at = found.place - found.factor * contrasts(times).0[found.number];
-                    (at - edge) * edge.signum()
-                });
-                assert!(gaussian.abs() < 0.06 && truncated.abs() < 0.12, "{edge}: {gaussian} {truncated}");
-                assert!(edge == 0.0 || gaussian < 0.0 && truncated > 0.0, "{edge}: {gaussian} {truncated}");
+                let beyond = power_beyond(1.0, -edge);
+                let part = times * beyond / (times * beyond + 1.0 - beyond);
+                let mixing = Mixing::of(&crossing(part)).unwrap();
+                let found = mixing.edge(0.0, 1.0, BeamShape::numbered(0), &contrasts(times), 0.2).unwrap();
+                let at = found.place - found.factor * contrasts(times).0[found.number];
+                assert!((at - edge).abs() < 2e-3, "{times} {edge}: {at}");
             }
         }
     }
 
     #[test]
     fn beams_before_what_outshines_the_face_are_found_mixed_farther_inside_than_outside() {
-        let seen =
-            |times: f64, noise: f64| Mixing::of(&crossing(0.5), noise).unwrap().seen(&contrasts(times));
-        assert_eq!(seen(1.0, 1e-3), [1.0; 2]);
+        let seen = |times: f64, noise: f32| {
+            let crossing = Crossing { noise: [noise; 2], ..crossing(0.5) };
+            Mixing::of(&crossing).unwrap().seen(BeamShape::numbered(0), &contrasts(times))
+        };
+        let [inside, outside] = seen(1.0, 1e-3);
+        assert!((inside - outside).abs() < 1e-6 && inside > 0.9, "{inside} {outside}");
         let [inside, outside] = seen(10.0, 2e-3);
         // A limit of 24 mm in 2 m: odds of 82, a tenth of that where the background is ten times as bright.
-        let expected = place_in_beam((0.988_f64 / 0.012 / 10.0).ln()).0;
-        assert!(inside == 1.0 && (outside - expected).abs() < 1e-6, "{outside}");
+        let place = |odds: f64| BeamShape::numbered(0).place(odds.ln()).0;
+        let odds = 0.988_f64 / 0.012;
+        assert!((outside - place(odds / 10.0)).abs() < 1e-6, "{outside}");
+        assert!((inside - place(odds * 10.0)).abs() < 1e-6, "{inside}");
         assert!(seen(10.0, 4e-3)[1] < outside, "with more noise less is found");
         let [dark, bright] = seen(0.1, 2e-3);
-        assert!((dark - outside).abs() < 1e-6 && bright == inside, "{dark}");
+        assert!((dark - outside).abs() < 1e-6 && (bright - inside).abs() < 1e-6, "{dark} {bright}");
+    }
+
+    #[test]
+    fn a_quiet_background_shows_less_of_the_face_in_a_beam() {
+        let seen = |noise: [f32; 2]| {
+            let crossing = Crossing { noise, ..crossing(0.5) };
+            Mixing::of(&crossing).unwrap().seen(BeamShape::numbered(0), &contrasts(1.0))
+        };
+        let [alike, quiet] = [[2e-3, 2e-3], [2e-3, 0.5e-3]].map(seen);
+        assert!(quiet[0] == alike[0] && quiet[1] > alike[1], "{alike:?} {quiet:?}");
     }
 
     #[test]
@@ -367,16 +353,16 @@ pub(super) mod tests {
         let exact = spread(vec![0.0; 90]);
         // Ten pixels in a hundred have the expected scatter, the others none.
         assert!((exact - (0.1 * SCATTER.0 * SCATTER.0).sqrt()).abs() < 1e-12, "{exact}");
-        let anywhere =
-            (1..1000).map(|k| f64::from(k) / 1000.0).map(|part| place_in_beam((part / (1.0 - part)).ln()).0);
+        let odds = |k: i32| (f64::from(k) / f64::from(1000 - k)).ln();
+        let anywhere = (1..1000).map(|k| BeamShape::numbered(SHAPES - 1).place(odds(k)).0);
         let uniform: Vec<f64> = anywhere.map(f64::abs).collect();
-        assert!((robust_deviation(uniform.clone()).unwrap() - 0.476).abs() < 1e-3);
+        assert!((robust_deviation(uniform.clone()).unwrap() - 0.330).abs() < 1e-3);
         assert_eq!(spread(uniform), NOTHING_TOLD);
     }
 
     #[test]
     fn only_a_single_mixed_pixel_before_a_plane_tells() {
-        let of = |crossing: Crossing| Mixing::of(&crossing, 1e-3);
+        let of = |crossing: Crossing| Mixing::of(&crossing);
         let known = crossing(0.5);
         assert!(of(Crossing { background: None, ..known }).is_none());
         assert!(of(Crossing { complete: false, ..known }).is_none());
@@ -385,7 +371,7 @@ pub(super) mod tests {
         assert!(tells(known));
         assert!(!tells(crossing(1.01)));
         assert!(!tells(Crossing { mixed: None, ..known }));
-        let several = MixedPixels { ends: [known.inside, known.outside], excess: 0.5 };
+        let several = pixels([known.inside, known.outside], 0.5);
         assert!(!tells(Crossing { mixed: Some(several), ..known }));
     }
 }

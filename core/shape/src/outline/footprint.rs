@@ -15,6 +15,15 @@ use platen_numerics::normal_distribution::cdf;
 use super::edge_likelihood::{HIDDEN_PART, OUTLIER_PART};
 use super::lattice_line::{BeamModel, FOOTPRINT_SPREAD, LatticeLine, SOFTNESS};
 
+/// Least scatter of the positions of an edge by its mixed pixels, in radii of the beam.
+const LEAST_SCATTER: f64 = 0.03;
+
+/// Density of the log odds of a mixed pixel that is an outlier.
+const OUTLIER_DENSITY: f64 = 0.1;
+
+/// Density of the standard normal distribution at its middle.
+const NORMAL_DENSITY: f64 = 0.398_942_28;
+
 /// Number of lines that determine the number of mixed pixels per line to a tenth.
 const LEAST_LINES: usize = 100;
 
@@ -64,41 +73,71 @@ fn by_number<'a>(lines: impl Iterator<Item = &'a LatticeLine>, angle: f64) -> f6
 /// Estimates the footprint at an edge of known position by maximum likelihood, in two nested grid searches about `all`,
 /// the footprint of all edges.
 ///
-/// The likelihood has two factors per line: which pixels are mixed and which are not, and the position of the edge in a
-/// mixed pixel by its range. `beam` contains the other properties of the beams.
-pub(super) fn at_edge(lines: &[LatticeLine], edge: impl Fn(f64) -> f64, all: f64, beam: BeamModel) -> f64 {
+/// The likelihood has two factors per line: which pixels are mixed and which are not, and the log odds of a mixed pixel,
+/// by its range. `beam` contains the other properties of the beams. Returns the footprint and the logarithm of its
+/// likelihood.
+pub(super) fn at_edge(
+    lines: &[LatticeLine],
+    edge: impl Fn(f64) -> f64,
+    all: f64,
+    beam: BeamModel,
+) -> (f64, f64) {
     /// Steps to each side and their size, in parts of `all`: coarse ones first, then finer ones about the best.
     const SEARCH: [(i32, f64); 2] = [(5, 0.16), (7, 0.02)];
-    /// Lines whose likelihoods are multiplied before a logarithm is taken: each is above 10^-6.
+    /// Lines whose likelihoods are multiplied before a logarithm is taken: each is above 10^-7.
     const TOGETHER: usize = 16;
-    let showing: Vec<(&LatticeLine, f64)> =
-        lines.iter().filter(|l| l.shows_footprint()).map(|l| (l, edge(l.along))).collect();
-    let likelihood = |line: &LatticeLine, edge: f64, footprint: f64| {
-        let beam = BeamModel { footprint, ..beam };
-        let [inside, outside] = line.seen(beam);
-        let within = |off: f64| if off > edge { inside - (off - edge) } else { outside - (edge - off) };
-        let is_mixed = |off: f64| (1.0 - HIDDEN_PART) * cdf(within(off) / (SOFTNESS * line.per_angle));
-        let sound = (1.0 - is_mixed(line.high)) * (1.0 - is_mixed(line.low));
-        let by_odds = line.edge_in_pixel(beam).map_or(1.0, |shared| {
-            let off = shared.off(edge, beam.contrasts.logarithms()) / shared.soft;
-            OUTLIER_PART + (-0.5 * off * off).exp() * all * line.per_radian / shared.soft
-        });
-        line.mixed.map_or(sound, |(low, high)| {
-            sound * (is_mixed(low) + OUTLIER_PART) * (is_mixed(high) + OUTLIER_PART) * by_odds
+    let showing: Vec<Observed> = lines
+        .iter()
+        .filter(|line| line.shows_footprint())
+        .map(|line| Observed {
+            line,
+            edge: edge(line.along),
+            seen: line.seen_parts(beam),
+            pixel: line.place_in_pixel(beam),
         })
-    };
+        .collect();
+    let scatter = (beam.mixed_spread * beam.mixed_spread + LEAST_SCATTER * LEAST_SCATTER).sqrt();
     let fits = |footprint: f64| {
         let off = (footprint / all - 1.0) / FOOTPRINT_SPREAD;
-        let together = |lines: &[(&LatticeLine, f64)]| {
-            lines.iter().map(|(l, e)| likelihood(l, *e, footprint)).product::<f64>()
+        let together = |lines: &[Observed]| {
+            lines.iter().map(|line| line.likelihood(footprint, scatter)).product::<f64>()
         };
         showing.chunks(TOGETHER).map(|lines| together(lines).ln()).sum::<f64>() - 0.5 * off * off
     };
-    SEARCH.iter().fold(all, |from, (steps, size)| {
+    SEARCH.iter().fold((all, 0.0), |(from, _), (steps, size)| {
         let trials = (-steps..=*steps).map(|k| from + all * size * f64::from(k));
-        let trials = trials.map(|footprint| (fits(footprint), footprint));
-        trials.max_by(|a, b| a.0.total_cmp(&b.0)).map_or(from, |(_, footprint)| footprint)
+        let trials = trials.map(|footprint| (footprint, fits(footprint)));
+        trials.max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((from, 0.0))
     })
+}
+
+/// A lattice line and what does not depend on the footprint.
+struct Observed<'a> {
+    line: &'a LatticeLine,
+    edge: f64,
+    /// Distances inside and outside of the edge up to which a beam is detected as mixed, in parts of its radius.
+    seen: [f64; 2],
+    /// Position of the edge in the beam of a single mixed pixel, in radii, and its derivative by the log odds.
+    pixel: Option<(f64, f64)>,
+}
+
+impl Observed<'_> {
+    /// Returns the likelihood of a footprint; `scatter` is that of the positions in mixed pixels, in radii.
+    fn likelihood(&self, footprint: f64, scatter: f64) -> f64 {
+        let Self { line, edge, seen: [inside, outside], pixel } = *self;
+        let radius = footprint * line.per_radian;
+        let within = |off: f64| {
+            if off > edge { radius * inside - (off - edge) } else { radius * outside - (edge - off) }
+        };
+        let is_mixed = |off: f64| (1.0 - HIDDEN_PART) * cdf(within(off) / (SOFTNESS * line.per_angle));
+        let sound = (1.0 - is_mixed(line.high)) * (1.0 - is_mixed(line.low));
+        let Some((low, high)) = line.mixed else { return sound };
+        let by_odds = pixel.map_or(1.0, |(place, slope)| {
+            let off = ((edge - low) / radius - place) / scatter;
+            OUTLIER_PART * OUTLIER_DENSITY + NORMAL_DENSITY * (-0.5 * off * off).exp() * slope / scatter
+        });
+        sound * (is_mixed(low) + OUTLIER_PART) * (is_mixed(high) + OUTLIER_PART) * by_odds
+    }
 }
 
 #[cfg(test)]

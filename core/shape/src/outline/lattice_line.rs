@@ -22,6 +22,7 @@
 //! (into the plate), in metres. Own; Masuda et al. take the boundary samples as the edge.
 
 use super::Sampling;
+use super::beam_shape::BeamShape;
 use super::contrast::{self, Contrasts, Mixing};
 use super::developed_strip::DevelopedStrip;
 use super::edge_likelihood::{Bound, EdgeLikelihood, EdgeObservation, SharedObservation};
@@ -61,6 +62,7 @@ const NEAR_SPREAD: f64 = 0.02;
 pub(super) struct BeamModel {
     /// Half the angle that a beam sees, radians.
     pub(super) footprint: f64,
+    pub(super) shape: BeamShape,
     /// Standard deviation of an interval's ends, in parts of the angle between beams.
     pub(super) softness: f64,
     /// Contrasts of the planes of the background.
@@ -71,8 +73,8 @@ pub(super) struct BeamModel {
 
 impl BeamModel {
     /// Builds a model of beams with the usual softness.
-    pub(super) fn of(footprint: f64, contrasts: Contrasts) -> Self {
-        Self { footprint, softness: SOFTNESS, contrasts, mixed_spread: contrast::spread(Vec::new()) }
+    pub(super) fn of(footprint: f64, shape: BeamShape, contrasts: Contrasts) -> Self {
+        Self { footprint, shape, softness: SOFTNESS, contrasts, mixed_spread: contrast::spread(Vec::new()) }
     }
 
     /// Returns true when the ranges of mixed pixels determine the position of the edge.
@@ -80,7 +82,7 @@ impl BeamModel {
         self.mixed_spread < contrast::NOTHING_TOLD
     }
 
-    /// Returns true when these beams and `other`, of the same softness, locate an edge at the same position.
+    /// Returns true when these beams and `other`, of the same shape and softness, locate an edge at the same position.
     pub(super) fn is_near(&self, other: &Self) -> bool {
         self.footprint == other.footprint
             && self.contrasts.are_near(&other.contrasts)
@@ -160,7 +162,7 @@ impl LatticeLine {
             strips: crossing.strips,
             background: crossing.background.map(|plane| plane.number),
             narrow: crossing.background.is_some_and(|plane| plane.narrow),
-            mixing: Mixing::of(crossing, noise)
+            mixing: Mixing::of(crossing)
                 .map(|mixing| if sight.silhouette == 0.0 { mixing } else { mixing.without_odds() }),
             complete: crossing.complete,
             beyond: crossing.beyond,
@@ -197,10 +199,16 @@ impl LatticeLine {
         self.low - slack < at && at < self.high + slack
     }
 
-    /// Returns the distances inside and outside of the edge up to which a beam is detected as mixed.
-    pub(super) fn seen(&self, beam: BeamModel) -> [f64; 2] {
-        let radius = beam.footprint * self.per_radian;
-        self.mixing.map_or([1.0; 2], |mixing| mixing.seen(&beam.contrasts)).map(|part| part * radius)
+    /// Returns the distances inside and outside of the edge up to which a beam is detected as mixed, in parts of its
+    /// radius.
+    pub(super) fn seen_parts(&self, beam: BeamModel) -> [f64; 2] {
+        self.mixing.map_or([1.0; 2], |mixing| mixing.seen(beam.shape, &beam.contrasts))
+    }
+
+    /// Returns the position of the edge in the beam of its single mixed pixel, in radii, and the derivative by the log
+    /// odds.
+    pub(super) fn place_in_pixel(&self, beam: BeamModel) -> Option<(f64, f64)> {
+        self.mixing?.place(beam.shape, &beam.contrasts)
     }
 
     /// Returns true when it has a single mixed pixel that determines the position of the edge, given the contrast.
@@ -212,7 +220,7 @@ impl LatticeLine {
     pub(super) fn edge_in_pixel(&self, beam: BeamModel) -> Option<SharedObservation> {
         let (at, _) = self.mixed?;
         let radius = beam.footprint * self.per_radian;
-        self.mixing.filter(|_| radius > 0.0)?.edge(at, radius, &beam.contrasts, beam.mixed_spread)
+        self.mixing.filter(|_| radius > 0.0)?.edge(at, radius, beam.shape, &beam.contrasts, beam.mixed_spread)
     }
 
     /// Returns the number of mixed pixels that see the far edge of a strip of background instead of the plate's edge:
@@ -228,7 +236,7 @@ impl LatticeLine {
     pub(super) fn likelihood(&self, beam: BeamModel) -> EdgeLikelihood {
         let soft = norm(beam.softness * self.per_angle, self.face_noise);
         let seen = beam.footprint * self.per_radian;
-        let [seen_inside, seen_outside] = self.seen(beam);
+        let [seen_inside, seen_outside] = self.seen_parts(beam).map(|part| part * seen);
         let shared = self.edge_in_pixel(beam);
         let of = |terms| EdgeLikelihood { along: self.along, terms, shared };
         let last = EdgeObservation::Last { cell: self.cell, behind: self.behind }.within(self.cell_noise);
@@ -337,7 +345,11 @@ pub(super) mod tests {
     /// Returns the likelihood of an edge `far` inside of the last cell of the face, over that at the cell, with 0.7 mm
     /// of noise.
     fn inside(line: &LatticeLine, far: f64) -> f64 {
-        let of = line.likelihood(BeamModel::of(1.6e-4, ContrastDistribution::PRIOR.mean()));
+        let of = line.likelihood(BeamModel::of(
+            1.6e-4,
+            BeamShape::numbered(0),
+            ContrastDistribution::PRIOR.mean(),
+        ));
         of.value(line.high + far, &[]) / of.value(line.high, &[])
     }
 
@@ -345,7 +357,11 @@ pub(super) mod tests {
     #[test]
     fn mixed_pixels_of_another_edge_behind_a_strip_do_not_count() {
         let line = LatticeLine { low: -21.1e-3, ..open_line(Some((-15.4e-3, -4e-3))) };
-        let of = line.likelihood(BeamModel::of(1.6e-4, ContrastDistribution::PRIOR.mean()));
+        let of = line.likelihood(BeamModel::of(
+            1.6e-4,
+            BeamShape::numbered(0),
+            ContrastDistribution::PRIOR.mean(),
+        ));
         for elsewhere in [-15e-3, -9.7e-3, 0.0] {
             assert!(
                 of.value(-4e-3, &[]) > 10.0 * of.value(elsewhere, &[]),

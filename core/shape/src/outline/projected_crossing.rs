@@ -34,8 +34,9 @@ impl ProjectedCrossing {
         let project = |pixels: MixedPixels| {
             let [near, far] = pixels.ends;
             let ends = [height_field.meet(near)?.0, height_field.meet(far)?.0];
-            let excess = pixels.excess + (near.norm() - ends[0].norm()) as f32;
-            Some(MixedPixels { ends, excess })
+            let more = (near.norm() - ends[0].norm()) as f32;
+            let (excess, jump) = (pixels.excess + more, pixels.jump.map(|jump| jump + more));
+            Some(MixedPixels { ends, excess, jump })
         };
         let all = |pixels: Option<MixedPixels>| pixels.map_or(Some(None), |pixels| project(pixels).map(Some));
         let (mixed, surely_mixed) = (all(crossing.mixed)?, all(crossing.surely_mixed)?);
