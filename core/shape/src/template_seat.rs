@@ -40,6 +40,9 @@ enum Support {
 
 /// Share of the chord that the contacts must span; with a smaller span the template rocks.
 const ROCKS: f64 = 0.25;
+/// Largest gap at which a template or a target counts as touching, metres. On a part of its own shape it lies flush and
+/// touches all of it, but the linear program returns any two or three of these places.
+pub const TOUCHES: f64 = 10e-6;
 /// Allowance for rounding, metres: contacts lie on a grid, so that their span often equals that share exactly.
 const ROUNDING: f64 = 1e-9;
 
@@ -48,7 +51,7 @@ impl Profile {
     /// gravity seat. Where it rocks, the balanced seat is judged.
     #[must_use]
     pub fn seat(&self, seat: Seat, chord: f64) -> (Seating, bool) {
-        let rocks = |gravity: &Seating| gravity.span(self) < ROCKS * chord - ROUNDING;
+        let rocks = |gravity: &Seating| self.span(gravity) < ROCKS * chord - ROUNDING;
         match seat {
             Seat::Balanced => (self.balanced(), rocks(&self.gravity())),
             Seat::Held => (self.held(), false),
@@ -137,6 +140,18 @@ impl Profile {
         }
     }
 
+    /// Returns the distance between the contacts, and farther where the template lies flush beyond them.
+    #[must_use]
+    pub fn span(&self, seating: &Seating) -> f64 {
+        let gaps = self.gaps(seating);
+        let flush = |place: &usize| gaps[*place].abs() <= TOUCHES;
+        let contacts = self.contacts(seating);
+        let (first, last) = (contacts[0], contacts[contacts.len() - 1]);
+        let first = (0..=first).rev().take_while(flush).last().unwrap_or(first);
+        let last = (last..self.x.len()).take_while(flush).last().unwrap_or(last);
+        self.x[last] - self.x[first]
+    }
+
     /// Returns the range of tilts of the touching template, from contact at one end to contact at the other, radians.
     #[must_use]
     pub fn rocking(&self) -> f64 {
@@ -168,18 +183,6 @@ impl Profile {
     }
 }
 
-impl Seating {
-    /// Returns the distance between the contacts.
-    #[must_use]
-    pub fn span(&self, profile: &Profile) -> f64 {
-        match self.support {
-            Support::OnTwo([i, j]) => profile.x[j] - profile.x[i],
-            Support::Balanced(_) => 0.0,
-            Support::Held => profile.x[profile.last()] - profile.x[0],
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -198,20 +201,34 @@ mod tests {
         let p = profile(|x| 0.004 * x * x + 0.01 * x);
         let seating = p.gravity();
         assert_eq!(p.contacts(&seating), [0, 200]);
-        assert!((seating.span(&p) - 2.0).abs() < 1e-12 && p.rocking() < 1e-12);
+        assert!((p.span(&seating) - 2.0).abs() < 1e-12 && p.rocking() < 1e-12);
         assert!((p.gaps(&seating)[100] - 0.004).abs() < 1e-12);
     }
 
     #[test]
     fn on_a_hill_the_template_rocks_and_balances() {
         let p = profile(|x| -0.004 * x * x + 0.003 * x);
-        assert!(p.gravity().span(&p) < 0.02);
+        assert!(p.span(&p.gravity()) < 0.11);
         let seating = p.balanced();
         let gaps = p.gaps(&seating);
         assert_eq!(p.contacts(&seating), [100]);
         assert!((gaps[0] - 0.004).abs() < 1e-12 && (gaps[200] - 0.004).abs() < 1e-12);
         // From contact at one end to contact at the other: twice the slope of 2 * 0.004 at the ends, half a step short.
         assert!((p.rocking() - 2.0 * 0.008 * 0.995).abs() < 1e-12, "{}", p.rocking());
+    }
+
+    /// A plate bent to the template's radius within a micrometre up to a place right of the middle, and less beyond it.
+    #[test]
+    fn flush_on_a_part_of_its_own_shape_the_template_does_not_rock() {
+        let beyond = |x: f64| (x - 0.3).max(0.0);
+        let nearly = profile(|x| -0.2 * beyond(x).powi(2) - 1e-6 * x * x);
+        let (seating, rocks) = nearly.seat(Seat::Gravity, 2.0);
+        let gap = largest(&nearly.gaps(&seating));
+        assert!(!rocks);
+        assert!((gap - 0.2 * 0.7_f64.powi(2)).abs() < 2e-6, "{gap}");
+        // With a hill of half a millimetre in place of the flush part it rocks.
+        let hill = profile(|x| -0.2 * beyond(x).powi(2) - 5e-4 * x * x);
+        assert!(hill.seat(Seat::Gravity, 2.0).1);
     }
 
     #[test]

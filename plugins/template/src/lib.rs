@@ -12,7 +12,7 @@
 //!
 //! | `seat` in the plate file | position of the template |
 //! |---|---|
-//! | `gravity` | lowest at its middle: the edge of the upper convex hull of d that spans the middle. With contacts closer than a quarter of the chord the template rocks, and the balanced seat is judged |
+//! | `gravity` | lowest at its middle: the edge of the upper convex hull of d that spans the middle. With contacts closer than a quarter of the chord the template rocks, and the balanced seat is judged; where it lies flush (within 0.01 mm) it does not rock |
 //! | `balanced` | equal gaps at both ends, one contact |
 //! | `held` | both ends set on the plate; the gap has a sign |
 //!

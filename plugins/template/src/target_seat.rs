@@ -7,6 +7,7 @@
 //! Other seats are near-optimal vertices of the linear program, found by shifting its objective away from the middle.
 
 use platen_sdk::{Error, ErrorKind, Result};
+use platen_shape::template_seat::TOUCHES;
 use platen_shape::{Placement, Surface, TargetSurface, Vec3};
 
 use crate::linear_program::{self, Vertex};
@@ -143,9 +144,6 @@ fn seat(
     })
 }
 
-/// Largest gap at which the target counts as touching, metres. A target that lies flush on a part of the plate touches
-/// all of it, but the linear program returns any three of these points.
-const TOUCHES: f64 = 10e-6;
 /// Number of directions in which the extent of the contacts is measured: the smallest extent is accurate to 0.5 %.
 const DIRECTIONS: usize = 32;
 /// Part of the shorter side that the contacts must span in every direction; with less the target rocks.
