@@ -199,7 +199,7 @@ impl Learner {
     /// Returns the standard deviation of the angle that a stroke for `angle` at x leaves, radians.
     #[must_use]
     pub fn sigma(&self, x: f64, angle: f64) -> f64 {
-        self.sigma_told(x, angle).hypot(self.ram_sigma() / self.slope())
+        self.sigma_reported(x, angle).hypot(self.ram_sigma() / self.slope())
     }
 
     /// Returns the same for a bend beside another one near x, as all bends except the first are.
@@ -215,7 +215,7 @@ impl Learner {
 
     /// Returns the same where the press reports the depth that the ram reached, radians.
     #[must_use]
-    pub fn sigma_told(&self, x: f64, angle: f64) -> f64 {
+    pub fn sigma_reported(&self, x: f64, angle: f64) -> f64 {
         self.angle_sigma(self.expected(x, angle).1, angle)
     }
 

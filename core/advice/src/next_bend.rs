@@ -293,8 +293,8 @@ impl<'a> Adviser<'a> {
 
     /// Returns the learned depth law where a depth can be advised: over a known die, on a press that reports its depth.
     fn depth_law(&self) -> Option<&Learner> {
-        let told = self.history.strokes.is_empty() || self.past.depth_told;
-        self.past.learner.as_ref().filter(|_| self.history.tells_depth && told)
+        let reported = self.history.strokes.is_empty() || self.past.depth_reported;
+        self.past.learner.as_ref().filter(|_| self.history.tells_depth && reported)
     }
 
     /// Returns the distance from the limit that a bend of this angle must keep, metres: the effect under a board of its

@@ -27,7 +27,7 @@ pub(crate) struct Past {
     /// State of the depth law; `None` without a die opening.
     pub(crate) learner: Option<Learner>,
     /// True when the press reported the depth of a stroke.
-    pub(crate) depth_told: bool,
+    pub(crate) depth_reported: bool,
     /// Number of strokes whose place was used to locate the die.
     pub(crate) marks: usize,
     /// Distance by which the last stroke stopped short of the advised depth, metres.
@@ -51,7 +51,7 @@ impl Past {
             bends: Vec::new(),
             last: None,
             learner: law.map(|law| Learner::new(law, history.like.as_ref())),
-            depth_told: history.strokes.iter().any(|stroke| stroke.depth.is_some()),
+            depth_reported: history.strokes.iter().any(|stroke| stroke.depth.is_some()),
             marks: 0,
             short: None,
         };
@@ -127,7 +127,7 @@ pub fn expected_angle(
         let middle = 0.5 * (low + high);
         if learner.depth(x, middle, sag) < depth { low = middle } else { high = middle }
     }
-    Some([low, P95 * learner.sigma_told(x, low)])
+    Some([low, P95 * learner.sigma_reported(x, low)])
 }
 
 /// Returns the depth for a bend of this angle along the line x, as advised by [`advise`](crate::advise), metres; `None`

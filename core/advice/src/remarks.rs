@@ -15,8 +15,8 @@ const FEW: u32 = 3;
 const SHORT: f64 = 0.3e-3;
 
 texts! { pub(crate),
-    NO_DIE "no depth: the plant file names no [[die]] of the number that the press tells" "深さなし: プレスが示す番号の [[die]] がプラントファイルにありません"
-    DEPTH_NOT_TOLD "no depth: the press does not tell the depth of its ram" "深さなし: プレスからラム深さが届きません"
+    NO_DIE "no depth: the plant file names no [[die]] of the number that the press reports" "深さなし: プレスが示す番号の [[die]] がプラントファイルにありません"
+    DEPTH_NOT_REPORTED "no depth: the press does not report the depth of its ram" "深さなし: プレスからラム深さが届きません"
     STEEL_ASSUMED "no [steel] in the plate file: {} MPa assumed" "板ファイルに [steel] がありません: {} MPa と仮定します"
     FIRST_MORE "the plate bent more than expected: check its thickness and steel, and the die" "予想より大きく曲がりました: 板厚、鋼種、金型を確認してください"
     FIRST_LESS "the plate bent less than expected: check its thickness and steel, and the die" "予想より曲がりませんでした: 板厚、鋼種、金型を確認してください"
@@ -31,7 +31,7 @@ texts! { pub(crate),
     FLATTER "under {} the plate is flatter than under the other templates, by up to {} mm of gap: no whole line mends it; shim the bed or tilt the ram" "{} の下は他の型板より平らです (すき間 {} mm まで): 全長の曲げでは直せません。敷板またはラムの傾きを調整してください"
     FLATTEN_LAST "bent too far around {} mm along u, {} mm along v: flatten there last" "u {} mm、v {} mm 付近は曲げ過ぎです: そこは最後に平らに戻してください"
     LEARNED "learned from {} like plates and {} strokes: the intervals are still wide" "学習: 同種の板 {} 枚、ストローク {} 回 (区間はまだ広い)"
-    STRETCHES "bending both ways stretches the plate: the place is told, neither angle nor gap" "二方向の曲げは板を伸ばします: 位置だけを示し、角度とすき間は示しません"
+    STRETCHES "bending both ways stretches the plate: only the place is given, neither angle nor gap" "二方向の曲げは板を伸ばします: 位置だけを示し、角度とすき間は示しません"
 }
 
 /// Returns the sentence on a press that is too coarse for the limit.
@@ -48,8 +48,8 @@ pub(crate) fn of_strokes(past: &Past, history: &PlateHistory) -> Vec<Sentence> {
     let say = |texts| Sentence::new(texts, &[]);
     let Some(learner) = &past.learner else { return vec![say(NO_DIE)] };
     let mut says = Vec::new();
-    if !history.tells_depth || !history.strokes.is_empty() && !past.depth_told {
-        says.push(say(DEPTH_NOT_TOLD));
+    if !history.tells_depth || !history.strokes.is_empty() && !past.depth_reported {
+        says.push(say(DEPTH_NOT_REPORTED));
     }
     if history.strokes.last().is_some_and(|stroke| stroke.missed_before) {
         says.push(say(MISSED));

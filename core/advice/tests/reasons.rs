@@ -162,7 +162,7 @@ fn no_depth_without_a_die_and_on_a_press_that_does_not_tell_it() {
     says(&advice, "names no [[die]]");
     assert_eq!((bend(&advice).depth, bend(&advice).depth_not_beyond), (None, None));
     let advice = Case { tells_depth: false, ..Case::default() }.advice(|_, _| 0.0);
-    says(&advice, "the press does not tell the depth of its ram");
+    says(&advice, "the press does not report the depth of its ram");
     assert_eq!((bend(&advice).depth, bend(&advice).depth_not_beyond), (None, None));
     assert!(bend(&advice).angle > 0.0);
 }

@@ -29,7 +29,7 @@ pub struct Advice {
 pub enum Step {
     /// Bend along a line.
     Bend(NextBend),
-    /// Bend at this place; no angle can be told, as the plate stretches.
+    /// Bend at this place; no angle is given, as the plate stretches.
     Place {
         /// Place (u, v), metres.
         at: [f64; 2],
@@ -59,11 +59,11 @@ pub struct NextBend {
     pub angle: f64,
     /// Interval of the angle that will remain.
     pub angle_95: [f64; 2],
-    /// Half width of the interval of the bend's place about the line, metres; `None` where none can be told.
+    /// Half width of the interval of the bend's place about the line, metres; `None` where none is given.
     #[serde(default)]
     pub place_95: Option<f64>,
     /// Depth of the ram below its touch on a flat plate of nominal thickness, metres; `None` without a die opening, or on a press that
-    /// does not tell its depth.
+    /// does not report its depth.
     pub depth: Option<f64>,
     /// Depth beyond which the plate could no longer be finished by bends of one side.
     pub depth_not_beyond: Option<f64>,
@@ -101,7 +101,7 @@ pub struct PressModel {
     pub covariance: [[f64; 2]; 2],
     /// Standard deviation of the next angle, radians.
     pub sigma_angle: f64,
-    /// Standard deviation of told minus wanted depth, metres.
+    /// Standard deviation of reported minus wanted depth, metres.
     pub ram_sigma: f64,
     /// Distance by which the bends lie off the advised lines, metres, positive onward.
     pub off_mark: f64,

@@ -23,13 +23,13 @@ pub struct PlateHistory {
     pub like: Option<LikePlates>,
     /// The plate may be turned over on this press.
     pub may_turn_over: bool,
-    /// The press tells the depth of its ram.
-    #[serde(default = "told")]
+    /// The press reports the depth of its ram.
+    #[serde(default = "reported")]
     pub tells_depth: bool,
 }
 
 /// Returns the default: records older than this field are from presses that report the depth.
-fn told() -> bool {
+fn reported() -> bool {
     true
 }
 
@@ -37,7 +37,7 @@ fn told() -> bool {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Die {
-    /// Number that the press tells (`die_id`).
+    /// Number that the press reports (`die_id`).
     pub id: u16,
     /// Distance between the shoulders, metres.
     pub opening: f64,
@@ -119,6 +119,6 @@ pub struct LikePlates {
     pub mean: [f64; 2],
     /// Their covariance between plates, row by row.
     pub covariance: [[f64; 2]; 2],
-    /// Standard deviation of told minus wanted depth, metres; `None` before any advice was followed.
+    /// Standard deviation of reported minus wanted depth, metres; `None` before any advice was followed.
     pub ram_sigma: Option<f64>,
 }

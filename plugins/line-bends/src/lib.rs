@@ -52,7 +52,7 @@ platen_sdk::options! {
         strain_max_percent: f64 = 5.0, unit "%", min 0.5, max 30.0;
         /// Order of the lines.
         order: String = "onward", choices ["onward", "ends_in"];
-        /// Whether a depth is told.
+        /// Whether a depth is given.
         depth: bool = true;
     }
 }

@@ -163,9 +163,9 @@ mod tests {
             let pixels = classify(&window, &face, background);
             (4..36).filter(|column| pixels[80 * column + FACE_ROWS] == Pixel::Mixed).count()
         };
-        let told = [&face, &Noise::of_background(&window)].map(mixed);
-        println!("told by the noise of the face and of the background: {told:?} of 32");
-        assert_eq!(told[1], 32);
-        assert!(told[0] < 16);
+        let found = [&face, &Noise::of_background(&window)].map(mixed);
+        println!("found by the noise of the face and of the background: {found:?} of 32");
+        assert_eq!(found[1], 32);
+        assert!(found[0] < 16);
     }
 }

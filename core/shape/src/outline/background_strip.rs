@@ -54,7 +54,7 @@ pub(super) fn shown(edges: [&[LatticeLine]; 4]) -> [Vec<usize>; 4] {
 pub(super) fn near_far_edges(lines: &[LatticeLine], edge: impl Fn(f64) -> f64, footprint: f64) -> Vec<usize> {
     let is_far = |line: &&LatticeLine| {
         let least = edge(line.along) - OUTSIDE * footprint * line.per_radian;
-        line.tells_contrast() && line.mixed.is_some_and(|(at, _)| at < least)
+        line.has_odds() && line.mixed.is_some_and(|(at, _)| at < least)
     };
     let is_doubtful = |line: &&LatticeLine| !line.strips.is_empty();
     let far: Vec<&LatticeLine> = lines.iter().filter(is_doubtful).filter(is_far).collect();

@@ -46,7 +46,7 @@ const PRIOR: (f64, f64) = (0.7, 0.7);
 const BETWEEN_EDGES: f64 = 0.1;
 
 /// Precision that an edge must add to a contrast to be used, in parts of the prior's precision.
-const LEAST_TOLD: f64 = 1e-3;
+const LEAST_ADDED: f64 = 1e-3;
 
 /// Expected scatter of these positions between mixed pixels, in radii, and the number of pixels whose weight this
 /// expectation has.
@@ -58,7 +58,7 @@ const SCATTER: (f64, f64) = (0.2, 10.0);
 const MOST_SCATTER: f64 = 0.25;
 
 /// Scatter that stands for pixels without information, in radii.
-pub(super) const NOTHING_TOLD: f64 = 10.0;
+pub(super) const UNINFORMATIVE: f64 = 10.0;
 
 /// Least jump of the range from the face to the background at which mixed pixels are distinguished from both, metres.
 const LEAST_JUMP: f64 = 0.05;
@@ -104,15 +104,15 @@ impl ContrastDistribution {
     }
 
     /// Combines the prior with the results of edges that were fitted with that prior, each less the prior itself.
-    pub(super) fn told_by<'a>(edges: impl Iterator<Item = &'a Self>) -> Self {
+    pub(super) fn combined<'a>(edges: impl Iterator<Item = &'a Self>) -> Self {
         let prior = PRIOR.1.powi(-2);
         let mut sums = [(prior, prior * PRIOR.0); BACKGROUND_PLANES];
         for edge in edges {
             for ((precision, weighted), (mean, spread)) in sums.iter_mut().zip(&edge.0) {
-                let told = spread.powi(-2) - prior;
-                if told > LEAST_TOLD * prior {
-                    let mean = (spread.powi(-2) * mean - prior * PRIOR.0) / told;
-                    let weight = 1.0 / (1.0 / told + BETWEEN_EDGES * BETWEEN_EDGES);
+                let added = spread.powi(-2) - prior;
+                if added > LEAST_ADDED * prior {
+                    let mean = (spread.powi(-2) * mean - prior * PRIOR.0) / added;
+                    let weight = 1.0 / (1.0 / added + BETWEEN_EDGES * BETWEEN_EDGES);
                     *precision += weight;
                     *weighted += weight * mean;
                 }
@@ -145,7 +145,7 @@ pub(super) fn spread(sizes: Vec<f64>) -> f64 {
     let n = sizes.len() as f64;
     let scatter = robust_deviation(sizes).unwrap_or(0.0);
     if scatter > MOST_SCATTER {
-        return NOTHING_TOLD;
+        return UNINFORMATIVE;
     }
     ((n * scatter * scatter + weight * expected * expected) / (n + weight)).sqrt()
 }
@@ -202,7 +202,7 @@ impl Mixing {
     }
 
     /// Returns true when a single mixed pixel determines the position of the edge.
-    pub(super) fn tells(&self) -> bool {
+    pub(super) fn has_odds(&self) -> bool {
         self.odds.is_some()
     }
 
@@ -284,17 +284,17 @@ pub(super) mod tests {
 
     /// Edges that determine the contrast of the first plane only.
     #[test]
-    fn edges_tell_each_other_the_contrast_of_a_plane() {
+    fn edges_share_the_contrast_of_a_plane() {
         let own = 0.2_f64;
-        let told = |mean: f64| {
+        let edge = |mean: f64| {
             let precision = own.powi(-2) + PRIOR.1.powi(-2);
             let mean = (mean * own.powi(-2) + PRIOR.0 * PRIOR.1.powi(-2)) / precision;
             let mut planes = [PRIOR; BACKGROUND_PLANES];
             planes[0] = (mean, precision.powf(-0.5));
             ContrastDistribution(planes)
         };
-        let edges = [told(-1.0), told(-1.4)];
-        let of = ContrastDistribution::told_by(edges.iter());
+        let edges = [edge(-1.0), edge(-1.4)];
+        let of = ContrastDistribution::combined(edges.iter());
         // Both with the spread between edges, and the prior.
         let both = 2.0 / (own * own + BETWEEN_EDGES * BETWEEN_EDGES);
         let precision = both + PRIOR.1.powi(-2);
@@ -348,7 +348,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn ranges_anywhere_between_the_surfaces_tell_nothing() {
+    fn ranges_anywhere_between_the_surfaces_have_no_weight() {
         assert!((spread(Vec::new()) - SCATTER.0).abs() < 1e-12);
         let exact = spread(vec![0.0; 90]);
         // Ten pixels in a hundred have the expected scatter, the others none.
@@ -357,21 +357,21 @@ pub(super) mod tests {
         let anywhere = (1..1000).map(|k| BeamShape::numbered(SHAPES - 1).place(odds(k)).0);
         let uniform: Vec<f64> = anywhere.map(f64::abs).collect();
         assert!((robust_deviation(uniform.clone()).unwrap() - 0.330).abs() < 1e-3);
-        assert_eq!(spread(uniform), NOTHING_TOLD);
+        assert_eq!(spread(uniform), UNINFORMATIVE);
     }
 
     #[test]
-    fn only_a_single_mixed_pixel_before_a_plane_tells() {
+    fn only_a_single_mixed_pixel_before_a_plane_has_odds() {
         let of = |crossing: Crossing| Mixing::of(&crossing);
         let known = crossing(0.5);
         assert!(of(Crossing { background: None, ..known }).is_none());
         assert!(of(Crossing { complete: false, ..known }).is_none());
         assert!(of(Crossing { beyond: Beyond::Nothing, ..known }).is_none());
-        let tells = |crossing: Crossing| of(crossing).is_some_and(|mixing| mixing.tells());
-        assert!(tells(known));
-        assert!(!tells(crossing(1.01)));
-        assert!(!tells(Crossing { mixed: None, ..known }));
+        let has_odds = |crossing: Crossing| of(crossing).is_some_and(|mixing| mixing.has_odds());
+        assert!(has_odds(known));
+        assert!(!has_odds(crossing(1.01)));
+        assert!(!has_odds(Crossing { mixed: None, ..known }));
         let several = pixels([known.inside, known.outside], 0.5);
-        assert!(!tells(Crossing { mixed: Some(several), ..known }));
+        assert!(!has_odds(Crossing { mixed: Some(several), ..known }));
     }
 }

@@ -162,10 +162,10 @@ pub(super) fn fit_all(mut edges: [EdgeData; 4], sampling: Sampling) -> Result<[E
     let common = if found.is_empty() { counted } else { found.iter().sum::<f64>() / found.len() as f64 };
     let [a, b, c, d] = of_each(|k| {
         let others = first.iter().enumerate().filter(|(other, _)| *other != k);
-        let told =
-            ContrastDistribution::told_by(others.filter_map(|(_, edge)| Some(&edge.as_ref()?.contrasts)));
+        let prior =
+            ContrastDistribution::combined(others.filter_map(|(_, edge)| Some(&edge.as_ref()?.contrasts)));
         let own = first[k].is_some() || !showing[k];
-        Edge::fit(&edges[k], (common, shape), own, &told, sampling)
+        Edge::fit(&edges[k], (common, shape), own, &prior, sampling)
     });
     Ok([a?, b?, c?, d?])
 }
@@ -263,8 +263,8 @@ impl Edge {
         };
         let agreeing = used.iter().filter(|b| b.agrees(posterior.curve.at(b.along), step));
         let seen = Coverage::new(agreeing.map(|b| b.along), step);
-        let told = lines.iter().filter(|line| line.tells_contrast()).count();
-        let contrast_known = data.dithered && beam.mixes_linearly() && told >= LEAST_PIXELS;
+        let n_odds = lines.iter().filter(|line| line.has_odds()).count();
+        let contrast_known = data.dithered && beam.mixes_linearly() && n_odds >= LEAST_PIXELS;
         let footprint = beam.footprint;
         let (strip, side_face) = (strip.clone(), data.side_face);
         Ok(Self {

@@ -79,7 +79,7 @@ impl BeamModel {
 
     /// Returns true when the ranges of mixed pixels determine the position of the edge.
     pub(super) fn mixes_linearly(&self) -> bool {
-        self.mixed_spread < contrast::NOTHING_TOLD
+        self.mixed_spread < contrast::UNINFORMATIVE
     }
 
     /// Returns true when these beams and `other`, of the same shape and softness, locate an edge at the same position.
@@ -212,8 +212,8 @@ impl LatticeLine {
     }
 
     /// Returns true when it has a single mixed pixel that determines the position of the edge, given the contrast.
-    pub(super) fn tells_contrast(&self) -> bool {
-        self.mixing.is_some_and(|mixing| mixing.tells())
+    pub(super) fn has_odds(&self) -> bool {
+        self.mixing.is_some_and(|mixing| mixing.has_odds())
     }
 
     /// Returns the position of the edge by its single mixed pixel.
