@@ -6,9 +6,9 @@
 //!
 //! Beams and brightness must be those of the samples, since they bias the edges: a beam of a few rays before a floor
 //! darker than the plate moves an edge by up to a tenth of the beam's radius. Both were read from the mixed pixels of
-//! the half-bent plate, whose truth is known: their ranges take ten values, and the two sides of the beam have the same
-//! power at odds of exp(-1.05). With the simulator's own beam and mill scale the samples are up to 1.6 times as far off
-//! as the worst of our draws.
+//! the half-bent plate, whose truth is known: their ranges take ten values, and where an edge halves the beam the floor
+//! returns exp(-1.05) of what the plate returns (both at normal incidence). With the simulator's own beam and mill scale
+//! the samples are up to 1.6 times as far off as the worst of our draws.
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;
