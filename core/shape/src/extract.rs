@@ -292,16 +292,7 @@ impl Extractor {
     }
 
     fn patch(&self, surface: &SegmentedComponent, regions: &[Vec<bool>]) -> Result<Patch, Refusal> {
-        let SegmentedComponent {
-            window,
-            noise,
-            background_noise,
-            pixels,
-            background,
-            slope_reach,
-            normals,
-            ..
-        } = surface;
+        let SegmentedComponent { window, noise, pixels, background, slope_reach, normals, .. } = surface;
         let mut face = vec![false; window.cells.len()];
         for region in regions {
             for (cell, core) in face.iter_mut().zip(region_growing::erode(window, region, *slope_reach)) {
@@ -326,7 +317,7 @@ impl Extractor {
         let scene = crossings::Scene {
             window,
             noise,
-            background_noise,
+            background_noise: &surface.background_noise,
             face: &face,
             pixels,
             background,

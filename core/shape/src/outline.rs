@@ -20,6 +20,7 @@
 //! | `edge_likelihood` | likelihood of an edge position given one lattice line (interval-censored observation) | own |
 //! | `side_face` | square or bevelled side face beside an edge, as a beam meets it | own |
 //! | `footprint` | angle that a beam sees, from the mixed pixels | own |
+//! | `beam_shape` | position of an edge in a beam from the power on either side; truncation of the Gaussian beam by maximum likelihood | Siegman 1986, 17.1; own |
 //! | `contrast` | position of an edge within a mixed pixel, by its range and the contrast of plate and background (linear mixing model) | own |
 //! | `edge` | each edge as the penalised spline of largest likelihood, by Newton's method | own |
 //! | `edge_posterior` | covariance: Laplace's method, or adaptive Metropolis along a lattice line | own |

@@ -19,6 +19,9 @@
 //!    detected as mixed farther inside of the edge than outside.
 //!
 //! In: one lattice line. Out: [`Mixing`], for the likelihood of that line. Own.
+//!
+//! Limits: two surfaces in a beam. A visible side face is a third one; seen under a few degrees it is too dark to be
+//! detected, and the edge can be found inside by as much as its visible width.
 
 use platen_numerics::median::robust_deviation;
 
