@@ -5,6 +5,8 @@
 //!
 //! - Gravity seat: the template rests on the plate from above, a + b x >= d(x), with the least a. This linear program
 //!   in two unknowns has an edge of the upper convex hull of d as its solution.
+//!   It rocks, and the balanced seat is judged, when its contacts span less than a quarter of the chord; where it lies
+//!   flush beyond them, the flush part counts.
 //! - Balanced seat: one contact, with equal gaps at both ends.
 //! - Held seat: both ends are set on the profile; gaps may be negative.
 
