@@ -82,7 +82,7 @@ fn a_plate_bent_too_far_is_turned_over_only_where_that_is_allowed() {
     let too_far = |_: f64, _: f64| 1.15 / 9.0;
     let advice = Case::default().advice(too_far);
     assert_eq!(reason(&advice), CannotAdvise::BentTooFar);
-    assert!(!advice.too_far.is_empty(), "its zones are told");
+    assert!(!advice.too_far.is_empty(), "its zones are named");
     let advice = Case { may_turn_over: true, ..Case::default() }.advice(too_far);
     assert!(matches!(&advice.step, Step::TurnOver(bend) if bend.angle < 0.0), "{:?}", advice.step);
 }

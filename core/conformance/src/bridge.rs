@@ -65,7 +65,7 @@ impl Test {
 pub fn run_bridge(
     subject: &BridgeSubject,
     only: Option<&str>,
-    mut tell: impl FnMut(&Outcome),
+    mut report: impl FnMut(&Outcome),
 ) -> Vec<Outcome> {
     let mut outcomes: Vec<Outcome> = Vec::new();
     let mut dumb = None;
@@ -81,7 +81,7 @@ pub fn run_bridge(
         }
         let seconds = start.elapsed().as_secs_f64();
         let outcome = Outcome { test: test.name, level: 2, demands: test.demands, verdict, seconds };
-        tell(&outcome);
+        report(&outcome);
         outcomes.push(outcome);
     }
     outcomes

@@ -87,7 +87,12 @@ impl Test {
 const GATES: [&str; 4] = ["load.loads", "options.default", "answer.given", "answer.same"];
 
 /// Runs the tests up to a level whose names contain `only`, and reports each.
-pub fn run(subject: &Subject, level: u8, only: Option<&str>, mut tell: impl FnMut(&Outcome)) -> Vec<Outcome> {
+pub fn run(
+    subject: &Subject,
+    level: u8,
+    only: Option<&str>,
+    mut report: impl FnMut(&Outcome),
+) -> Vec<Outcome> {
     let (mut outcomes, mut shut): (Vec<Outcome>, Option<&str>) = (Vec::new(), None);
     let wanted = tests::ALL.iter().copied().flatten().filter(|test| test.level <= level);
     let wanted = wanted.filter(|test| subject.kind().map_or(true, |kind| tests::concerns(test.name, kind)));
@@ -102,7 +107,7 @@ pub fn run(subject: &Subject, level: u8, only: Option<&str>, mut tell: impl FnMu
         if GATES.contains(&test.name) && !passed && !(left_out && test.name == "answer.same") {
             shut = shut.or(Some(test.name));
         }
-        tell(&outcome);
+        report(&outcome);
         outcomes.push(outcome);
     }
     outcomes

@@ -133,7 +133,7 @@ impl<'a> ScanReader<'a> {
         let mut fits = about.cells <= MAX_KEPT;
         let kept = &mut self.kept;
         *kept = SphericalCells::with_capacity(if fits { about.cells as usize } else { 0 });
-        let (mut bytes, mut told) = (Vec::new(), 0);
+        let (mut bytes, mut reported) = (Vec::new(), 0);
         decode_ahead::for_each(self.source.cells()?, |batch| {
             survey.add(batch).map_err(ReadError::from)?;
             checksum = continued_checksum(checksum, &batch.cells.range, &mut bytes);
@@ -143,8 +143,8 @@ impl<'a> ScanReader<'a> {
             } else {
                 *kept = SphericalCells::default();
             }
-            if survey.cells() / PROGRESS_EVERY > told {
-                told = survey.cells() / PROGRESS_EVERY;
+            if survey.cells() / PROGRESS_EVERY > reported {
+                reported = survey.cells() / PROGRESS_EVERY;
                 progress((survey.cells() as f64 / about.cells.max(1) as f64).min(1.0))?;
             }
             Ok::<(), E>(())

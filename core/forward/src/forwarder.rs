@@ -192,7 +192,7 @@ mod tests {
         let changed = written();
         assert_eq!(changed.sinks[0].sent, 7);
         tokio::time::sleep(SAME * STATE).await;
-        assert!(written().at > changed.at, "the time tells that the forwarder runs");
+        assert!(written().at > changed.at, "the time shows that the forwarder runs");
         keeper.abort();
     }
 }

@@ -34,7 +34,7 @@ pub(crate) struct MqttSink {
     topic: String,
     /// Folder in which the host keeps its state.
     folder: PathBuf,
-    told: Option<PressState>,
+    published: Option<PressState>,
     connection: Option<Connection>,
 }
 
@@ -45,7 +45,7 @@ impl MqttSink {
             client_id: format!("platen-{}-{}", names.site, names.press),
             topic: format!("platen/v1/{}/{}", names.site, names.press),
             folder: folder.to_owned(),
-            told: None,
+            published: None,
             connection: None,
         })
     }
@@ -65,12 +65,12 @@ impl MqttSink {
     }
 
     /// Publishes the state of the press if it has changed.
-    async fn tell(&mut self) -> Result<(), SinkError> {
+    async fn publish_state(&mut self) -> Result<(), SinkError> {
         let now = PressState::load(&self.folder);
-        if self.told.as_ref() != Some(&now) {
+        if self.published.as_ref() != Some(&now) {
             let state = self.state(&now);
             self.connection()?.publish(vec![state]).await?;
-            self.told = Some(now);
+            self.published = Some(now);
         }
         Ok(())
     }
@@ -78,15 +78,15 @@ impl MqttSink {
 
 impl Sink for MqttSink {
     async fn connect(&mut self) -> Result<(), SinkError> {
-        (self.connection, self.told) = (None, None);
+        (self.connection, self.published) = (None, None);
         let will = self.state(&PressState::nobody());
         self.connection = Some(Connection::open(&self.address, &self.client_id, will).await?);
         // The newest state first, then the changes that were not sent.
-        self.tell().await
+        self.publish_state().await
     }
 
     async fn deliver(&mut self, messages: &[Message], _: &[Owner]) -> Result<Receipt, SinkError> {
-        self.tell().await?;
+        self.publish_state().await?;
         let publications = messages.iter().map(|message| Publication {
             topic: format!("{}/{}", self.topic, if message.key.kind == "event" { "alarm" } else { "stroke" }),
             payload: message.text.clone().into_bytes(),
@@ -100,7 +100,7 @@ impl Sink for MqttSink {
     }
 
     async fn idle(&mut self, time: Duration) -> Result<(), SinkError> {
-        self.tell().await?;
+        self.publish_state().await?;
         self.connection()?.idle(time).await
     }
 

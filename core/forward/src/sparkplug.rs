@@ -53,7 +53,7 @@ pub(crate) struct SparkplugSink {
 struct Live {
     connection: Connection,
     session: Session,
-    told: PressState,
+    published: PressState,
     /// Metrics of the last stroke, for a rebirth.
     last: Option<Message>,
 }
@@ -105,7 +105,7 @@ impl SparkplugSink {
             (NBIRTH, metrics::node_birth(&state, live.session.bd_seq(), numbers[0])),
             (DBIRTH, metrics::device_birth(live.last.as_ref(), numbers[1])),
         ];
-        live.told = state;
+        live.published = state;
         let births = births.map(|(kind, payload)| self.publication(kind, payload)).to_vec();
         self.live()?.connection.publish(births).await
     }
@@ -134,14 +134,14 @@ impl SparkplugSink {
     }
 
     /// Publishes the press's state if it has changed.
-    async fn tell(&mut self) -> Result<(), SinkError> {
+    async fn publish_state(&mut self) -> Result<(), SinkError> {
         let state = PressState::load(&self.folder);
         let live = self.live()?;
-        if live.told != state {
+        if live.published != state {
             let seq = live.session.next_seq();
-            live.told = state.clone();
-            let told = self.publication(NDATA, metrics::node_data(&state, seq));
-            self.live()?.connection.publish(vec![told]).await?;
+            live.published = state.clone();
+            let change = self.publication(NDATA, metrics::node_data(&state, seq));
+            self.live()?.connection.publish(vec![change]).await?;
         }
         Ok(())
     }
@@ -166,7 +166,7 @@ impl Sink for SparkplugSink {
             connection.subscribe(&format!("{SPBV01}/STATE/{host}"))?;
         }
         let session = Session::new(&self.names, self.primary_host.as_deref(), bd_seq);
-        self.live = Some(Live { connection, session, told: PressState::nobody(), last });
+        self.live = Some(Live { connection, session, published: PressState::nobody(), last });
         if self.primary_host.is_none() {
             return self.give_birth().await;
         }
@@ -184,7 +184,7 @@ impl Sink for SparkplugSink {
 
     async fn deliver(&mut self, messages: &[Message], _: &[Owner]) -> Result<Receipt, SinkError> {
         self.hear().await?;
-        self.tell().await?;
+        self.publish_state().await?;
         let mut publications = Vec::new();
         for message in messages {
             let live = self.live()?;
@@ -204,7 +204,7 @@ impl Sink for SparkplugSink {
     }
 
     async fn idle(&mut self, time: Duration) -> Result<(), SinkError> {
-        self.tell().await?;
+        self.publish_state().await?;
         self.live()?.connection.idle(time).await?;
         self.hear().await
     }

@@ -62,7 +62,7 @@ impl MeasuredPlate {
             contacts: Vec::new(),
             ..found.clone()
         };
-        let told = reports
+        let with_bends = reports
             .iter()
             .find(|report| report.findings.figures.iter().any(|figure| figure.name == "curvature.above_lod"));
         Self {
@@ -73,7 +73,7 @@ impl MeasuredPlate {
             steel: plate.steel.clone(),
             task: task.clone(),
             templates: found.map(slim).collect(),
-            bends: told.map(|report| bends(report)),
+            bends: with_bends.map(|report| bends(report)),
         }
     }
 }
@@ -197,12 +197,12 @@ fn pressed(
     let between = has_other_strokes_between(archive, plant, measured, before)?;
     let bends = measured.bends.clone().filter(|_| earlier.is_some());
     // On other supports the plate's own weight changes the bends.
-    let told = measured.data.ram_depth.filter(|_| !between && !measured.task.supports_changed);
+    let reported = measured.data.ram_depth.filter(|_| !between && !measured.task.supports_changed);
     let stroke = PressedStroke {
         run_id: i64::from(measured.run_id),
         stroke: measured.key.stroke,
         wanted: None,
-        depth: told,
+        depth: reported,
         force: measured.data.force,
         not_measured: bends.is_none(),
         missed_before: between,
@@ -267,23 +267,23 @@ fn is_meant(next: &NextBend, task: &Task, stroke: &PressedStroke) -> bool {
         (lines.coordinate(bend.at) - lines.coordinate(middle(next))).abs() <= MEANT.0
     });
     let as_deep = match (stroke.depth, next.depth) {
-        (Some(told), Some(advised)) => (told / advised - 1.0).abs() <= MEANT.1,
+        (Some(reported), Some(advised)) => (reported / advised - 1.0).abs() <= MEANT.1,
         _ => true,
     };
     near && as_deep
 }
 
 /// Returns whether a stroke whose bend lies `off_line` from the advised line was pressed as advised.
-fn has_followed(advice: &AdviceRecord, next: &NextBend, off_line: f64, told: Option<f64>) -> bool {
+fn has_followed(advice: &AdviceRecord, next: &NextBend, off_line: f64, reported: Option<f64>) -> bool {
     let (off_mark, ram) = advice
         .advice
         .as_ref()
         .and_then(|advice| advice.model)
         .map_or((0.0, 0.0), |model| (model.off_mark, model.ram_sigma));
     let (place, sigmas, depth) = FOLLOWED;
-    let as_deep = told
+    let as_deep = reported
         .zip(next.depth)
-        .is_none_or(|(told, advised)| (told - advised).abs() <= (sigmas * ram).max(depth));
+        .is_none_or(|(reported, advised)| (reported - advised).abs() <= (sigmas * ram).max(depth));
     (off_line - off_mark).abs() <= place && as_deep
 }
 

@@ -62,7 +62,7 @@ use alarms::Alarms;
 use measurement_worker::MeasurementWorker;
 use platen_engine::pipeline::{Pipeline, PipelineError};
 use platen_engine::plugin::{CancelToken, Catalogue, Quarantine};
-use screen::{Screen, Teller};
+use screen::{EventSender, Screen};
 use stopping::PlateInHand;
 
 /// Time for the last scan to be written when the host stops.
@@ -112,21 +112,21 @@ pub async fn run(
     let (commands, inbox) = std::sync::mpsc::channel();
     let address = pages.as_ref().map(Pages::address);
     let beside = status::Beside { pages: address, ..status::Beside::default() };
-    let mut teller = Teller::default();
+    let mut events = EventSender::default();
     let mut screen = None;
     if let Some(pages) = pages {
         tracing::info!("pages on {}", pages.address());
         let started = Screen::start(pages, plant, &press, catalogue, &host.status, &beside)?;
-        teller = started.1;
+        events = started.1;
         screen = Some(tokio::spawn(started.0.keep(host.status.clone())));
     }
-    let desk = AdviceDesk::start(plant, catalogue, teller.clone(), host.answers.clone())
+    let desk = AdviceDesk::start(plant, catalogue, events.clone(), host.answers.clone())
         .map_err(HostError::Thread)?;
     let receivers = measurement_worker::Receivers {
         answers: host.answers.clone(),
         strokes,
         lost: Arc::clone(&beside.lost),
-        screen: teller.clone(),
+        screen: events.clone(),
         plugins: Arc::clone(&beside.plugins),
         clock: beside.clock.clone(),
         advice: desk.clone(),
@@ -136,7 +136,7 @@ pub async fn run(
     let worker = worker.map_err(HostError::Thread)?;
 
     let alarms =
-        Alarms { history: Arc::clone(&history), newest: beside.alarm.clone(), screen: teller.clone() };
+        Alarms { history: Arc::clone(&history), newest: beside.alarm.clone(), screen: events.clone() };
     let forward = plant.forward.as_ref().map(|_| {
         let state = Arc::clone(&beside.forward);
         tokio::spawn(forward::watch(plant.output.folder.clone(), state, alarms.clone()))
@@ -226,7 +226,7 @@ fn dispatch(
         }
         Order::Command(Command::PartEnd) => {
             plate.ended();
-            alarms.screen.tell(screen::Event::PartEnded);
+            alarms.screen.send(screen::Event::PartEnded);
             let ended =
                 alarms.history.lock().unwrap_or_else(PoisonError::into_inner).part_end(Timestamp::now());
             if let Err(error) = ended {
@@ -237,7 +237,7 @@ fn dispatch(
             let token = CancelToken::default();
             if let Command::Scan { key, run_id, data } = &command {
                 plate.stroke();
-                alarms.screen.tell(screen::Event::Accepted {
+                alarms.screen.send(screen::Event::Accepted {
                     key: *key,
                     run_id: *run_id,
                     data: data.clone(),

@@ -2,7 +2,7 @@
 // nothing for 1.5 s of its own clock, or whose press cycle stands still, shows no verdict, place or number.
 
 const meta = document.querySelector('meta[name="platen-live"]');
-const told = meta.dataset;
+const data = meta.dataset;
 const SILENCE_MS = 1500;
 const RETRY_MS = 300;
 const CELLS = 'span[id], p[id], img[id], rect[id]';
@@ -56,8 +56,8 @@ function state(event) {
 function beat(event) {
   heard = performance.now();
   const { boot, cycle_age_ms: age } = JSON.parse(event.data);
-  if (boot !== told.boot) location.reload();
-  else if (age > Number(told.cycleMs)) silence('stuck', told.stuck, told.stuckRemedy);
+  if (boot !== data.boot) location.reload();
+  else if (age > Number(data.cycleMs)) silence('stuck', data.stuck, data.stuckRemedy);
   else if (stale) open();
 }
 
@@ -85,14 +85,14 @@ function watch() {
   // Time has passed that the page's own clock has not seen: the computer slept.
   if (Date.now() - looked > SILENCE_MS) shown();
   looked = Date.now();
-  if (performance.now() - heard > SILENCE_MS) silence('lost', told.lost, told.lostRemedy);
+  if (performance.now() - heard > SILENCE_MS) silence('lost', data.lost, data.lostRemedy);
 }
 
 // A hidden page has no connection, and shows nothing when it comes back.
 function shown() {
   if (document.hidden) close();
   else {
-    silence('lost', told.lost, told.lostRemedy);
+    silence('lost', data.lost, data.lostRemedy);
     open();
   }
 }

@@ -56,9 +56,9 @@ impl ControlClient {
     pub(crate) fn pending(&mut self) -> Result<Option<PendingStroke>, Error> {
         let Registers::Registers { p: press, h: host } = self.ask(r#"{"get":"registers"}"#)?;
         let word = |block: &[u16], at: usize| block.get(at).copied().unwrap_or(0);
-        let (stroke, told) = (word(&press, p::STROKE_ID), word(&host, h::STATUS));
+        let (stroke, host_status) = (word(&press, p::STROKE_ID), word(&host, h::STATUS));
         let waits = word(&press, p::CONTROL) & control::CLEAR_TO_SCAN != 0
-            && told & (status::BUSY | status::SCAN_DONE) == status::BUSY
+            && host_status & (status::BUSY | status::SCAN_DONE) == status::BUSY
             && word(&host, h::ACK_STROKE_ID) == stroke;
         let (session, attempt) = (word(&press, p::SESSION_ID), word(&press, p::ATTEMPT));
         Ok(waits.then_some(PendingStroke { session, stroke, attempt }))

@@ -66,7 +66,7 @@ pub(crate) async fn start(command: &Command) -> Result<SimPress, Error> {
 pub(crate) async fn run_until_stopped(mut press: SimPress, command: &Command) -> Result<(), Error> {
     tokio::select! {
         ended = press.ended() => ended?,
-        told = stop_requested(command.with_parent) => told?,
+        stopped = stop_requested(command.with_parent) => stopped?,
     }
     if let Ok(counters) = serde_json::to_string(&press.counters()) {
         tracing::info!(%counters, "press stopped");

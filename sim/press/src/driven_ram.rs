@@ -91,7 +91,7 @@ pub struct DrivenRam {
     press: Press,
     random: Pcg64,
     /// Depth of the last stroke, as reported by the press.
-    pub told_mm: Option<f64>,
+    pub reported_mm: Option<f64>,
 }
 
 impl DrivenRam {
@@ -117,7 +117,7 @@ impl DrivenRam {
             nominal_thickness: thickness,
         };
         let strip = FibreStrip::new(length, steel, |_| 0.0);
-        Self { config: config.clone(), strip, axis_deg, press, random, told_mm: None }
+        Self { config: config.clone(), strip, axis_deg, press, random, reported_mm: None }
     }
 
     /// Returns the number of the die set.
@@ -136,7 +136,7 @@ impl DrivenRam {
         let length = self.strip.step() * self.strip.curvature().count() as f64;
         let x = 1e-3 * at_mm + 0.5 * length;
         let angle = self.strip.press(&self.press, x, 1e-3 * reached_mm, order.turned_over);
-        self.told_mm = Some(reached_mm + draw(0.03, &mut self.random));
+        self.reported_mm = Some(reached_mm + draw(0.03, &mut self.random));
         Stroke {
             axis_deg: self.axis_deg,
             at_mm,

@@ -138,8 +138,9 @@ impl FormingModel {
 
     /// Returns die set and depth of the last stroke, as reported by the press; `None` before a driven stroke.
     #[must_use]
-    pub fn told(&self) -> Option<(u16, f64)> {
-        (self.strategy == Strategy::Operator).then(|| (self.ram.die_id(), self.ram.told_mm.unwrap_or(0.0)))
+    pub fn reported(&self) -> Option<(u16, f64)> {
+        (self.strategy == Strategy::Operator)
+            .then(|| (self.ram.die_id(), self.ram.reported_mm.unwrap_or(0.0)))
     }
 
     /// Records the latest result.

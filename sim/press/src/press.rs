@@ -452,7 +452,7 @@ impl Press {
         block[p::PART_NAME..p::PART_NAME + 8].copy_from_slice(&ascii_words(&self.config.part_name));
         block[p::BEND_INDEX] = u16::try_from(self.forming.state().strokes).unwrap_or(u16::MAX);
         block[p::THICKNESS] = (self.config.plate.blank.thickness_mm * 100.0).round() as u16;
-        if let Some((die_id, depth_mm)) = self.forming.told() {
+        if let Some((die_id, depth_mm)) = self.forming.reported() {
             block[p::RAM_DEPTH] = ((depth_mm * 100.0).round() as i16).cast_unsigned();
             block[p::DIE_ID] = die_id;
         }

@@ -99,8 +99,12 @@ fn a_plate_that_came_back_turned_is_refused() {
         let output = measure(&turned, &["--before", text(&before)]);
         refused(&output, 1, &["turned.e57", turn, "plate_rot", "--turned"]);
         // The plate turned counter-clockwise, seen from above: its corner (0, 0) is found again.
-        let told = measure(&turned, &["--before", text(&before), "--turned", &yaw_deg.to_string()]);
-        assert!(json(&told)["says"].to_string().contains("nothing changed above"), "{}", json(&told)["says"]);
+        let measured = measure(&turned, &["--before", text(&before), "--turned", &yaw_deg.to_string()]);
+        assert!(
+            json(&measured)["says"].to_string().contains("nothing changed above"),
+            "{}",
+            json(&measured)["says"]
+        );
         let wrong =
             measure(&turned, &["--before", text(&before), "--turned", &(yaw_deg - 180.0).to_string()]);
         refused(&wrong, 1, &["turned.e57", "by half a turn"]);

@@ -327,7 +327,7 @@ fn a_stroke_that_no_host_saw_is_told_with_the_next() {
     let late = until("the advice after the next measured stroke", || advice(&plant, 3));
     let strokes = late["history"]["strokes"].as_array().unwrap();
     assert_eq!(strokes.last().unwrap()["missed_before"], true, "{late:#}");
-    let told = String::from_utf8(said(&["advise", plant.to_str().unwrap(), "1"])).unwrap();
-    assert!(told.contains("a stroke before the last one was not measured"), "{told}");
+    let text = String::from_utf8(said(&["advise", plant.to_str().unwrap(), "1"])).unwrap();
+    assert!(text.contains("a stroke before the last one was not measured"), "{text}");
     assert_eq!(host.stop(), Some(0), "{}", host.log());
 }

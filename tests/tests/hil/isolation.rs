@@ -193,7 +193,7 @@ fn strokes_whose_driver_dies_at_any_moment_are_measured_or_reported() {
     let taken = stats["taken"].as_array().unwrap();
     let measured = taken.iter().filter(|result| result["words"][55] != 0xFFFF).count();
     let deaths = log.matches("its process ended: SIGILL").count();
-    println!("{measured} of {} strokes measured, {files} descriptors, {deaths} deaths told", taken.len());
+    println!("{measured} of {} strokes measured, {files} descriptors, {deaths} deaths reported", taken.len());
     assert_eq!(taken.len(), 5 * parts, "{stats:#}\n{log}");
     assert_eq!(verdicts(&plant).len(), 5 * parts);
     assert!(deaths > 0 || parts < 4, "the driver died");

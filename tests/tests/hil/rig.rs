@@ -192,11 +192,11 @@ async fn desk(
     scan: Duration,
 ) {
     let bends: Arc<Mutex<BTreeMap<StrokeKey, u32>>> = Arc::default();
-    let tell = |answer| {
+    let answer = |answer| {
         // The press side may have ended; then the answer is not needed.
         let _ = answers.send(answer);
     };
-    tell(Answer::Scanner { ready: Ok(()), estimate: Some(Duration::from_secs(20)) });
+    answer(Answer::Scanner { ready: Ok(()), estimate: Some(Duration::from_secs(20)) });
     while let Some(order) = orders.recv().await {
         match order {
             Order::Command(Command::Scan { key, .. }) => {
@@ -217,7 +217,7 @@ async fn desk(
             }
             Order::Command(Command::Evaluate(key)) => {
                 let seen = bends.lock().unwrap().get(&key).copied();
-                tell(match seen {
+                answer(match seen {
                     Some(strokes) => Answer::Result(key, Box::new(measurement(strokes))),
                     None => Answer::Failed(key, Code::EvaluationFailed),
                 });

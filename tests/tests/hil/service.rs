@@ -102,12 +102,12 @@ fn a_sink_that_is_away_is_told_by_the_host_and_forgotten_by_none() {
     let start =
         || program("platen").arg("forward").arg(&plant).stderr(std::process::Stdio::piped()).spawn().unwrap();
     let mut forwarder = Forwarder(start());
-    let told = until("both sinks away, with what is to be sent", || {
-        let told = sinks(&host)?;
-        let all = told["sinks"].as_array()?.iter().all(|it| it["backlog"] == 3 && it["error"].is_string());
-        (all && told["sinks"].as_array()?.len() == 2).then_some(told)
+    let state = until("both sinks away, with what is to be sent", || {
+        let state = sinks(&host)?;
+        let all = state["sinks"].as_array()?.iter().all(|it| it["backlog"] == 3 && it["error"].is_string());
+        (all && state["sinks"].as_array()?.len() == 2).then_some(state)
     });
-    for sink in told["sinks"].as_array().unwrap() {
+    for sink in state["sinks"].as_array().unwrap() {
         assert!(sink["error"].as_str().unwrap().contains(&format!("127.0.0.1:{port}: ")), "{sink}");
     }
     let second = start().wait_with_output().unwrap();

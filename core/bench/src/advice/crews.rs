@@ -52,7 +52,7 @@ fn identical_hands_are_not_told_apart_by_their_steel() {
         assert_eq!(skill.differences.len(), 1);
         told_apart += usize::from(skill.differences[0].is_significant());
     }
-    println!("{told_apart} of {TRIALS} pairs told apart; hardness {hardness:.2?} mm");
+    println!("{told_apart} of {TRIALS} pairs distinguished; hardness {hardness:.2?} mm");
     // 1 is expected; of 20 pairs more than 3 differ significantly in one of 60 runs.
     assert!(told_apart <= 3, "{told_apart}");
 }

@@ -237,7 +237,7 @@ pub(super) struct HiddenPlate<'a> {
 
 /// Outcome of one stroke.
 pub(super) struct Pressed {
-    pub(super) told: f64,
+    pub(super) reported: f64,
     /// Angle that remained, radians.
     pub(super) angle: f64,
     /// Coordinate and angle of the bend as measured by the scans.
@@ -280,10 +280,10 @@ impl<'a> HiddenPlate<'a> {
         let place = x + self.shop.off_mark + self.shop.place * normal(random);
         let stops = if random.f64() < self.shop.short { 0.75 + 0.2 * random.f64() } else { 1.0 };
         let reached = (depth + self.shop.ram * normal(random)) * stops;
-        let told = reached + 0.03e-3 * normal(random);
+        let reported = reached + 0.03e-3 * normal(random);
         let angle = self.strip.press(&self.press, place, reached, backwards);
         let seen = [place + BEND[1] * normal(random), angle + BEND[0] * normal(random)];
-        Pressed { told, angle, seen: (seen[1].abs() > LEAST).then_some(seen) }
+        Pressed { reported, angle, seen: (seen[1].abs() > LEAST).then_some(seen) }
     }
 
     /// Returns the sag of the plate in the die at x, as an operator measures it under a ruler, metres.

@@ -331,7 +331,7 @@ impl Job<'_> {
             }
             let wanted = WantedBend { at: middle, angle, depth: depth.filter(|_| advised.depth) };
             // A stroke that stopped before its depth does not test an interval that is given for the wanted depth.
-            let short = pressed.told < depth_wanted - 0.5e-3;
+            let short = pressed.reported < depth_wanted - 0.5e-3;
             if !backwards && !short && advised.replans {
                 let [angles, gaps, third] = &mut self.outcome.inside;
                 let inside = usize::from((next.angle_95[0]..=next.angle_95[1]).contains(&pressed.angle));
@@ -383,7 +383,7 @@ impl Job<'_> {
             }
         };
         PressedStroke {
-            depth: Some(pressed.told),
+            depth: Some(pressed.reported),
             bends: pressed.seen.map(bend).into_iter().collect(),
             ..PressedStroke::default()
         }

@@ -86,6 +86,6 @@ mod tests {
         assert_eq!(found.iter().map(|f| f.n).collect::<Vec<_>>(), [5, 4]);
         assert_eq!(numbers[0], [3.0, 0.0, 2.0]);
         assert!(numbers[1][0] == 0.0 && (numbers[1][1] - (4.0 * 0.25_f64 / 3.0).sqrt()).abs() < 1e-12);
-        assert!(Repeated::of(&all[..1], Kind::Corner).is_empty(), "one scan tells no scatter");
+        assert!(Repeated::of(&all[..1], Kind::Corner).is_empty(), "one scan has no scatter");
     }
 }

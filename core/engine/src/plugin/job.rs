@@ -34,7 +34,7 @@ impl ProgressSink {
     }
 
     /// Passes on a progress report of a plugin; a share that is not finite is dropped.
-    pub(super) fn tell(&self, share: f64, phase: &str) {
+    pub(super) fn report(&self, share: f64, phase: &str) {
         if let Some(receive) = self.0.as_ref().filter(|_| share.is_finite()) {
             receive(share.clamp(0.0, 1.0), phase);
         }

@@ -19,7 +19,7 @@ use crate::plate_history;
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  platen advise config/plant-north.toml 12\n  platen advise config/plant-north.toml 12 --stroke 3 --json\n\n\
-                  Needs a plate that was measured with [advice] in the plant file: what the advisor was told lies in advice.json beside each \
+                  Needs a plate that was measured with [advice] in the plant file: the input of the advisor lies in advice.json beside each \
                   result. Nothing is written, and the press is not asked."
 )]
 pub(super) struct Command {

@@ -65,14 +65,14 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
                                                 "elevation_min": -1.0, "elevation_max": 0.2});
     }
     let subject = BridgeSubject::new(address(&check.address)?, settings, Duration::from_secs(check.limit_s));
-    let mut told = Ok(());
+    let mut printed = Ok(());
     let all = run_bridge(&subject, check.only.as_deref(), |outcome| {
-        if told.is_ok() {
+        if printed.is_ok() {
             let again = format!("platen bridge check {} --only {}", check.address, outcome.test);
-            told = outcomes::tell(common, outcome, &again);
+            printed = outcomes::print(common, outcome, &again);
         }
     });
-    told?;
+    printed?;
     outcomes::sum(
         common,
         ("bridge", &check.address, "scan bridge protocol 1.0"),

@@ -40,7 +40,7 @@ pub(super) struct Command {
     #[arg(long, value_name = "SCAN")]
     baseline: Option<PathBuf>,
     /// Turn of the plate since the scan before it, degrees, counter-clockwise seen from above the press; as the press's
-    /// register `plate_rot` tells it during `platen run`
+    /// register `plate_rot` reports it during `platen run`
     #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
     turned: Option<f64>,
     /// New folder for result.json, tables (CSV), the plate as a mesh (PLY, VTK) and pictures (SVG)

@@ -8,7 +8,7 @@ use platen_conformance::{Outcome, Verdict, junit};
 use super::{CliError, Common, output};
 
 /// Prints an outcome, and after a failure the command that repeats it.
-pub(super) fn tell(common: &Common, outcome: &Outcome, again: &str) -> Result<(), CliError> {
+pub(super) fn print(common: &Common, outcome: &Outcome, again: &str) -> Result<(), CliError> {
     if common.json {
         return Ok(());
     }

@@ -125,7 +125,7 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
     let mut bytes = Vec::new();
     table(&rows, command.compare).write_parquet(&mut bytes)?;
     output_folder::replace(&part, &bytes)?;
-    tell(common, command, &rows, &counts, &part)?;
+    print(common, command, &rows, &counts, &part)?;
     Ok(ExitCode::from(u8::from(!counts.failed.is_empty())))
 }
 
@@ -161,7 +161,7 @@ impl Counts {
     }
 }
 
-fn tell(
+fn print(
     common: &Common,
     command: &Command,
     rows: &[Row],

@@ -18,7 +18,7 @@ use platen_report::advice::AdviceRecord;
 use platen_shape::Surface;
 use tokio::sync::mpsc::UnboundedSender;
 
-use super::screen::{Event, Teller};
+use super::screen::{Event, EventSender};
 use crate::plate_history::{self, MeasuredPlate};
 
 /// Result for which advice is to be computed.
@@ -59,7 +59,7 @@ impl AdviceDesk {
     pub(super) fn start(
         plant: &PlantFile,
         catalogue: &Catalogue,
-        screen: Teller,
+        screen: EventSender,
         answers: UnboundedSender<Answer>,
     ) -> std::io::Result<Self> {
         let Some(wanted) = plant.advice.clone() else { return Ok(Self::default()) };
@@ -103,7 +103,7 @@ struct Thread {
     plant: PlantFile,
     wanted: AdviceUse,
     catalogue: Catalogue,
-    screen: Teller,
+    screen: EventSender,
     answers: UnboundedSender<Answer>,
     /// The plugin, once it has been created.
     advisor: Option<Advisor>,
@@ -175,7 +175,7 @@ impl Thread {
             // The press side ends with the host.
             let _ = self.answers.send(Answer::Advice(record.key, Box::new(image)));
         }
-        self.screen.tell(Event::Advised(Box::new(record)));
+        self.screen.send(Event::Advised(Box::new(record)));
     }
 }
 

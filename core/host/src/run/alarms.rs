@@ -6,7 +6,7 @@ use jiff::Timestamp;
 use platen_history::History;
 use platen_model::{Code, Language, StrokeKey};
 
-use super::screen::{Event, Teller};
+use super::screen::{Event, EventSender};
 use super::status::NewestAlarm;
 
 /// Passes alarms on. Alarms of the press side are already in its registers.
@@ -14,13 +14,13 @@ use super::status::NewestAlarm;
 pub(super) struct Alarms {
     pub(super) history: Arc<Mutex<History>>,
     pub(super) newest: NewestAlarm,
-    pub(super) screen: Teller,
+    pub(super) screen: EventSender,
 }
 
 impl Alarms {
     /// Raises an alarm, with or without a stroke.
     pub(super) fn raise(&self, code: Code, stroke: Option<StrokeKey>, detail: Option<&str>) {
-        self.screen.tell(Event::Alarm(code));
+        self.screen.send(Event::Alarm(code));
         let alarm = code.alarm();
         let stroke = stroke.map(|key| format!("{key}: ")).unwrap_or_default();
         let detail = detail.map(|detail| format!(" ({detail})")).unwrap_or_default();

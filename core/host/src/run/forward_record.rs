@@ -36,7 +36,7 @@ impl ForwardRecord {
     /// Returns one line for each sink; a single line if the forwarder has never run.
     #[must_use]
     pub fn lines(&self) -> Vec<(String, String)> {
-        let not = if self.running { "" } else { "platen forward does not run; as it last told: " };
+        let not = if self.running { "" } else { "platen forward does not run; its last state: " };
         let lines: Vec<_> = self
             .sinks
             .iter()

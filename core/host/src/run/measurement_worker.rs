@@ -35,7 +35,7 @@ use super::previous_scans::PreviousScans;
 use super::region::{self, Region};
 use super::scan_retention::ScanRetention;
 use super::scan_store;
-use super::screen::{Event, MeasuredStroke, Teller};
+use super::screen::{Event, EventSender, MeasuredStroke};
 use crate::judgement::{self, Circumstances, Judgement};
 use crate::plate_history::MeasuredPlate;
 
@@ -114,7 +114,7 @@ pub(super) struct Receivers {
     pub(super) strokes: UnboundedSender<StrokeReport>,
     /// Number of strokes whose documents could not be written.
     pub(super) lost: Arc<AtomicU64>,
-    pub(super) screen: Teller,
+    pub(super) screen: EventSender,
     pub(super) plugins: PluginStates,
     pub(super) clock: Clock,
     pub(super) advice: AdviceDesk,
@@ -174,7 +174,7 @@ impl MeasurementWorker {
     fn answer(&self, answer: Answer) {
         if let Answer::Scanner { ready, estimate } = &answer {
             let estimate_s = estimate.map(|time| time.as_secs_f64());
-            self.receivers.screen.tell(Event::Scanner { ready: *ready, estimate_s });
+            self.receivers.screen.send(Event::Scanner { ready: *ready, estimate_s });
         }
         // The press side may have ended.
         let _ = self.receivers.answers.send(answer);
@@ -201,7 +201,7 @@ impl MeasurementWorker {
                 tracing::error!("scanner: {why}");
                 self.in_reach = None;
                 let out_of_use = matches!(why, PipelineError::Plugin(PluginError::Quarantined { .. }));
-                self.tell_ready(Err(if out_of_use { Code::PluginOutOfUse } else { Code::ScannerNotReady }));
+                self.report_ready(Err(if out_of_use { Code::PluginOutOfUse } else { Code::ScannerNotReady }));
             }
         }
     }
@@ -242,7 +242,7 @@ impl MeasurementWorker {
             Ok(()) => tracing::info!("scanner ready"),
             Err((_, why)) => tracing::error!("{why}"),
         }
-        self.tell_ready(ready);
+        self.report_ready(ready);
     }
 
     fn report_plugins(&self) {
@@ -259,7 +259,7 @@ impl MeasurementWorker {
         *self.receivers.plugins.lock().unwrap_or_else(PoisonError::into_inner) = states;
     }
 
-    fn tell_ready(&mut self, ready: Result<(), Code>) {
+    fn report_ready(&mut self, ready: Result<(), Code>) {
         self.reported = Some(ready);
         // A plate that has moved out of its window is scanned twice.
         let estimate = self.estimate.map(|estimate| (2 * estimate).max(LEAST_ESTIMATE));
@@ -303,14 +303,14 @@ impl MeasurementWorker {
 
     /// Returns a receiver that forwards a scan's progress to the pages, percent by percent.
     fn shown_progress(&self, key: StrokeKey) -> ProgressSink {
-        if !self.receivers.screen.is_heard() {
+        if !self.receivers.screen.is_connected() {
             return ProgressSink::default();
         }
         let (screen, shown) = (self.receivers.screen.clone(), AtomicU8::new(u8::MAX));
         ProgressSink::new(move |share, _| {
             let percent = (100.0 * share) as u8;
             if shown.swap(percent, Ordering::Relaxed) != percent {
-                screen.tell(Event::Scanned { key, percent });
+                screen.send(Event::Scanned { key, percent });
             }
         })
     }
@@ -404,7 +404,7 @@ impl MeasurementWorker {
 
     /// Passes a result on to the pages if they are served.
     fn show(&self, run_id: u32, record: &ResultRecord, reports: &[Result<Report, PluginError>]) {
-        if !self.receivers.screen.is_heard() {
+        if !self.receivers.screen.is_connected() {
             return;
         }
         let sound: Vec<&Report> = reports.iter().flatten().collect();
@@ -415,7 +415,7 @@ impl MeasurementWorker {
             Vec::new()
         });
         let measured = MeasuredStroke::new(run_id, record, &sound, strokes);
-        self.receivers.screen.tell(Event::Measured(Box::new(measured)));
+        self.receivers.screen.send(Event::Measured(Box::new(measured)));
     }
 
     /// Passes a result to the advisor if there is one. Trials are not used for learning, and a result without files has

@@ -91,15 +91,16 @@ impl MeasuredStroke {
 
 /// Connection to the pages for dispatcher and worker; does nothing where no pages are served.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Teller(Option<UnboundedSender<Event>>);
+pub(super) struct EventSender(Option<UnboundedSender<Event>>);
 
-impl Teller {
+impl EventSender {
     /// Returns whether pages are served, so that an event is needed.
-    pub(super) fn is_heard(&self) -> bool {
+    pub(super) fn is_connected(&self) -> bool {
         self.0.is_some()
     }
 
-    pub(super) fn tell(&self, event: Event) {
+    /// Queues an event for the pages.
+    pub(super) fn send(&self, event: Event) {
         if let Some(sender) = &self.0 {
             // The pages may have ended before the host.
             let _ = sender.send(event);
@@ -154,7 +155,7 @@ pub(super) struct Screen {
     board: Arc<Board>,
     site: Arc<Site>,
     events: UnboundedReceiver<Event>,
-    teller: Teller,
+    sender: EventSender,
     _server: Server,
 }
 
@@ -170,7 +171,7 @@ impl Screen {
         catalogue: &Catalogue,
         status: &watch::Receiver<Status>,
         beside: &Beside,
-    ) -> Result<(Self, Teller), ScreenError> {
+    ) -> Result<(Self, EventSender), ScreenError> {
         let status = status.borrow().clone();
         let mut facts = Facts::new(press);
         facts.observe(&status);
@@ -184,8 +185,8 @@ impl Screen {
         let source = Arc::clone(&site) as Arc<dyn platen_screen::Source>;
         let server = Server::start(pages.listener, pages.access, source)?;
         let (sender, events) = unbounded_channel();
-        let teller = Teller(Some(sender));
-        Ok((Self { board, site, events, teller: teller.clone(), _server: server }, teller))
+        let sender = EventSender(Some(sender));
+        Ok((Self { board, site, events, sender: sender.clone(), _server: server }, sender))
     }
 
     /// Keeps the pages up to date until the press side ends.
@@ -215,10 +216,10 @@ impl Screen {
         let Event::Measured(measured) = event else { return };
         let next = measured.record.next.as_ref().and_then(Next::place);
         let Some(place) = next.map(|next| next.at_mm) else { return };
-        let (site, teller, run_id) = (Arc::clone(&self.site), self.teller.clone(), measured.run_id);
+        let (site, sender, run_id) = (Arc::clone(&self.site), self.sender.clone(), measured.run_id);
         tokio::task::spawn_blocking(move || {
             if site.was_bent(run_id, place) {
-                teller.tell(Event::Again(run_id));
+                sender.send(Event::Again(run_id));
             }
         });
     }

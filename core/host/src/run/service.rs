@@ -20,7 +20,7 @@ pub(super) async fn keep(mode: Mode, mut status: watch::Receiver<Status>) {
         return;
     }
     let mut fed: Option<Instant> = None;
-    let mut told = String::new();
+    let mut notified = String::new();
     loop {
         if mode == Mode::Off {
             tokio::time::sleep(PERIOD).await;
@@ -36,13 +36,13 @@ pub(super) async fn keep(mode: Mode, mut status: watch::Receiver<Status>) {
             notices.push(NotifyState::Watchdog);
             fed = Some(Instant::now());
         }
-        if state != told {
+        if state != notified {
             notices.push(NotifyState::Status(&state));
         }
         if let Err(error) = sd_notify::notify(&notices) {
-            tracing::warn!("systemd cannot be told: {error}");
+            tracing::warn!("systemd cannot be notified: {error}");
         }
-        told = state;
+        notified = state;
     }
 }
 

@@ -132,7 +132,7 @@ impl Reader<'_> {
     }
 
     /// Returns a number for which 0 means "none": no stroke has zero force, ram depth, die or thickness.
-    fn told(&self, input: Input) -> Option<f64> {
+    fn reported(&self, input: Input) -> Option<f64> {
         self.number(input).filter(|value| *value != 0.0)
     }
 
@@ -143,9 +143,9 @@ impl Reader<'_> {
             part_id: self.count_u32(Input::PartId),
             part_name: self.text(Input::PartName),
             bend_index: self.count(Input::BendIndex),
-            thickness: self.told(Input::Thickness),
-            force: self.told(Input::PressForce),
-            ram_depth: self.told(Input::RamDepth),
+            thickness: self.reported(Input::Thickness),
+            force: self.reported(Input::PressForce),
+            ram_depth: self.reported(Input::RamDepth),
             plate_x: self.number(Input::PlateX),
             plate_y: self.number(Input::PlateY),
             plate_rot: self.number(Input::PlateRot),
@@ -288,8 +288,8 @@ mod tests {
     fn zero_tells_nothing_of_what_no_stroke_is_made_without() {
         let mut words = golden();
         let of = |data: StrokeData| (data.thickness, data.force, data.ram_depth, data.die_id);
-        let told = of(PressImage::decode(&RegisterMap::pph1(), 3, &words).unwrap().data);
-        assert!(told.0.and(told.1).and(told.2).and(told.3).is_some(), "{told:?}");
+        let reported = of(PressImage::decode(&RegisterMap::pph1(), 3, &words).unwrap().data);
+        assert!(reported.0.and(reported.1).and(reported.2).and(reported.3).is_some(), "{reported:?}");
         let map = RegisterMap::pph1();
         for input in [Input::Thickness, Input::PressForce, Input::RamDepth, Input::DieId] {
             words[usize::from(map.input(input).unwrap().place.offset().unwrap())] = 0;

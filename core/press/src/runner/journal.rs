@@ -30,15 +30,15 @@ pub(super) async fn start<J: Journal>(mut journal: J) -> Result<(Recorder, Recal
     let read = spawn_blocking(move || (journal.recall(), journal)).await;
     let (recalled, journal) = read.map_err(|_| None)?;
     let (records, queue) = mpsc::unbounded_channel();
-    let (tell, done) = mpsc::unbounded_channel();
-    let task = tokio::spawn(write(journal, queue, tell));
+    let (completions, done) = mpsc::unbounded_channel();
+    let task = tokio::spawn(write(journal, queue, completions));
     Ok((Recorder { records, done, task }, recalled.map_err(Some)?))
 }
 
 async fn write<J: Journal>(
     mut journal: J,
     mut queue: mpsc::UnboundedReceiver<Record>,
-    tell: mpsc::UnboundedSender<Done>,
+    completions: mpsc::UnboundedSender<Done>,
 ) {
     while let Some(record) = queue.recv().await {
         let (key, stage) = (record.key(), record.stage());
@@ -48,7 +48,7 @@ async fn write<J: Journal>(
         journal = back;
         let error = result.err().map(|error| error.to_string());
         // The receiver may be gone when the host ends.
-        let _ = tell.send(Done { key, stage, error, took: asked.elapsed() });
+        let _ = completions.send(Done { key, stage, error, took: asked.elapsed() });
     }
 }
 

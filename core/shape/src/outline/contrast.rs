@@ -20,8 +20,8 @@
 //!
 //! In: one lattice line. Out: [`Mixing`], for the likelihood of that line. Own.
 //!
-//! Limits: two surfaces in a beam. A visible side face is a third one; seen under a few degrees it is too dark to be
-//! detected, and the edge can be found inside by as much as its visible width.
+//! Limits: the position of the edge by the range of a mixed pixel assumes two surfaces. Where a side face is visible as
+//! a third one only the detection limit is used, with the echo of the side face (`lattice_line`).
 
 use platen_numerics::median::robust_deviation;
 
@@ -196,10 +196,10 @@ impl Mixing {
         Self { odds: None, ..self }
     }
 
-    /// Returns the distances inside and outside of the edge up to which a beam is detected as mixed, in parts of its
-    /// radius.
-    pub(super) fn seen(&self, shape: BeamShape, contrasts: &Contrasts) -> [f64; 2] {
-        let contrast = contrasts.0[self.plane] + self.by_geometry;
+    /// Returns the distances inside and outside of the edge of a plate up to which a beam is detected as mixed, in parts
+    /// of its radius; `echo` is that of the plate there, in parts of the face's.
+    pub(super) fn seen(&self, shape: BeamShape, contrasts: &Contrasts, echo: f64) -> [f64; 2] {
+        let contrast = contrasts.0[self.plane] + self.by_geometry - echo.max(f64::MIN_POSITIVE).ln();
         let [face, background] = self.most_odds;
         [face + contrast, background - contrast].map(|odds| shape.place(odds).0.max(LEAST_SEEN))
     }
@@ -255,7 +255,7 @@ pub(super) mod tests {
 
     /// Returns a crossing straight below the scanner, before a plane 2 m behind it; `background` is the part of that
     /// plane in the echo of the mixed pixel.
-    fn crossing(background: f64) -> Crossing {
+    pub(crate) fn crossing(background: f64) -> Crossing {
         let at = |y: f64| Vec3::new(0.0, y, -RANGE);
         Crossing {
             sample: 0,
@@ -325,7 +325,7 @@ pub(super) mod tests {
     fn beams_before_what_outshines_the_face_are_found_mixed_farther_inside_than_outside() {
         let seen = |times: f64, noise: f32| {
             let crossing = Crossing { noise: [noise; 2], ..crossing(0.5) };
-            Mixing::of(&crossing).unwrap().seen(BeamShape::numbered(0), &contrasts(times))
+            Mixing::of(&crossing).unwrap().seen(BeamShape::numbered(0), &contrasts(times), 1.0)
         };
         let [inside, outside] = seen(1.0, 1e-3);
         assert!((inside - outside).abs() < 1e-6 && inside > 0.9, "{inside} {outside}");
@@ -344,7 +344,7 @@ pub(super) mod tests {
     fn a_quiet_background_shows_less_of_the_face_in_a_beam() {
         let seen = |noise: [f32; 2]| {
             let crossing = Crossing { noise, ..crossing(0.5) };
-            Mixing::of(&crossing).unwrap().seen(BeamShape::numbered(0), &contrasts(1.0))
+            Mixing::of(&crossing).unwrap().seen(BeamShape::numbered(0), &contrasts(1.0), 1.0)
         };
         let [alike, quiet] = [[2e-3, 2e-3], [2e-3, 0.5e-3]].map(seen);
         assert!(quiet[0] == alike[0] && quiet[1] > alike[1], "{alike:?} {quiet:?}");

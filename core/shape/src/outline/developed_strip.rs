@@ -171,9 +171,14 @@ impl DevelopedStrip {
         self.station(Vector2::new(along, 0.0)).flat.y
     }
 
-    /// Returns the unit vector within the face across the edge, into the plate.
-    pub(super) fn inward(&self, along: f64) -> Vec3 {
-        self.station(Vector2::new(along, 0.0)).inward
+    /// Returns the unit vector within the face across a curve of this slope in the plane, into the plate.
+    ///
+    /// The base curve itself wavers with the lattice: where an edge runs along a column its direction is wrong by up to
+    /// a degree.
+    pub(super) fn inward(&self, along: f64, slope: f64) -> Vec3 {
+        let station = self.station(Vector2::new(along, 0.0));
+        let (t, inward) = (station.flat_tangent, Vector2::new(-slope, 1.0).normalize());
+        station.tangent * t.dot(&inward) + station.inward * t.perp(&inward)
     }
 
     /// Returns the unit normal of the face towards the scanner.

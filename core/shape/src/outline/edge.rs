@@ -78,12 +78,14 @@ pub(super) struct EdgeData {
     strip: DevelopedStrip,
     side_face: SideFace,
     crossings: Vec<ProjectedCrossing>,
+    /// Curve of maximum penalised likelihood through the middles of the intervals: its direction is that of the edge.
+    course: SplineCurve,
     lines: Vec<LatticeLine>,
     dithered: bool,
-    /// Mean curvature of the edges of the plate by its membrane strain, 1/m, positive inwards.
-    mean_curvature: f64,
-    from: Vec3,
-    to: Vec3,
+    prior: CurveFit,
+    /// Places of the corners along the edge.
+    from: f64,
+    to: f64,
 }
 
 impl EdgeData {
@@ -100,19 +102,55 @@ impl EdgeData {
         sampling: Sampling,
     ) -> Result<Self, OutlineError> {
         let strip = DevelopedStrip::new(&crossings, [from, to], 0.5 * thickness, sampling)?;
-        let line = |crossing| LatticeLine::new(&strip, crossing, &side_face, sampling);
+        let [from, to] = [from, to].map(|corner| strip.flatten(corner).x);
+        let prior = prior(strip.span(), [from, to], mean_curvature);
+        let course = course(&strip, &crossings, &prior, sampling.step).ok_or_else(|| strip.too_few())?;
+        let line =
+            |crossing| LatticeLine::new(&strip, |at| slope(&course, at), crossing, &side_face, sampling);
         let lines: Vec<LatticeLine> = crossings.iter().map(line).collect();
         let dithered = is_dithered(&lines, |along| strip.base(along), sampling.step);
-        Ok(Self { strip, side_face, crossings, lines, dithered, mean_curvature, from, to })
+        Ok(Self { strip, side_face, crossings, course, lines, dithered, prior, from, to })
     }
 
     /// Replaces lines, given by their numbers, by those beside a strip of background narrower than a beam.
     fn take_for_strip(&mut self, lines: impl IntoIterator<Item = usize>, sampling: Sampling) {
         for at in lines {
             let crossing = self.crossings[at].beside_strip();
-            self.lines[at] = LatticeLine::new(&self.strip, &crossing, &self.side_face, sampling);
+            let slope = |at| slope(&self.course, at);
+            self.lines[at] = LatticeLine::new(&self.strip, slope, &crossing, &self.side_face, sampling);
         }
     }
+}
+
+/// Returns the prior of an edge curve over a span, with the corners at `corners` along it. `mean_curvature` is that of
+/// all edges of the plate by its membrane strain, 1/m, positive inwards.
+fn prior((start, end): (f64, f64), corners: [f64; 2], mean_curvature: f64) -> CurveFit {
+    let axis = UniformKnots::new(start, end, ((end - start) / SPAN).ceil() as usize);
+    let amplitude = [mean_curvature, STRAIN_SPREAD * mean_curvature];
+    CurveFit::with_curvature(axis, |at| strain_profile(at, corners), amplitude, CURVATURE.0, CURVATURE.1)
+}
+
+/// Fits a curve to the middles of the intervals near the strip's base curve.
+fn course(
+    strip: &DevelopedStrip,
+    crossings: &[ProjectedCrossing],
+    prior: &CurveFit,
+    step: f64,
+) -> Option<SplineCurve> {
+    let mut fit = prior.clone();
+    for ProjectedCrossing { crossing, .. } in crossings {
+        let [inside, outside] = [crossing.inside, crossing.outside].map(|p| strip.flatten(p));
+        let (middle, width) = (0.5 * (inside + outside), (inside.y - outside.y).abs().max(step));
+        if (middle.y - strip.base(middle.x)).abs() < width {
+            fit.add(middle.x, middle.y, 12.0 / (width * width));
+        }
+    }
+    fit.solve().map(|(course, _)| course)
+}
+
+/// Returns the slope of a curve over half a span of its knots.
+fn slope(curve: &SplineCurve, along: f64) -> f64 {
+    (curve.at(along + 0.25 * SPAN) - curve.at(along - 0.25 * SPAN)) / (0.5 * SPAN)
 }
 
 /// Fits the four edges: first those at which the footprint can be estimated, then all of them.
@@ -211,13 +249,8 @@ impl Edge {
         sampling: Sampling,
     ) -> Result<Self, OutlineError> {
         let step = sampling.step;
-        let EdgeData { strip, lines, .. } = data;
-        let (start, end) = strip.span();
-        let axis = UniformKnots::new(start, end, ((end - start) / SPAN).ceil() as usize);
-        let (from, to) = (strip.flatten(data.from).x, strip.flatten(data.to).x);
-        let profile = |along| strain_profile(along, [from, to]);
-        let amplitude = [data.mean_curvature, STRAIN_SPREAD * data.mean_curvature];
-        let prior = CurveFit::with_curvature(axis, profile, amplitude, CURVATURE.0, CURVATURE.1);
+        let EdgeData { strip, lines, prior, from, to, .. } = data;
+        let (from, to) = (*from, *to);
         let with_contrasts = prior.clone().with_parameters(known.planes());
         let too_few = || strip.too_few();
         let fit = |beam: BeamModel| {
@@ -250,16 +283,8 @@ impl Edge {
         let posterior = if data.dithered {
             Posterior::laplace(curve, &covariance)
         } else {
-            Posterior::sampled(
-                &curve,
-                &prior,
-                lines,
-                [from, to],
-                BeamModel { footprint, ..beam },
-                known,
-                step,
-            )
-            .ok_or_else(too_few)?
+            Posterior::sampled(&curve, prior, lines, [from, to], BeamModel { footprint, ..beam }, known, step)
+                .ok_or_else(too_few)?
         };
         let agreeing = used.iter().filter(|b| b.agrees(posterior.curve.at(b.along), step));
         let seen = Coverage::new(agreeing.map(|b| b.along), step);
@@ -309,7 +334,8 @@ impl Edge {
     /// Returns the part of the standard deviation that is due to the contrast, metres; its error has the same sign at
     /// all edges of a plate.
     pub(super) fn contrast_sigma(&self, along: f64) -> f64 {
-        let (point, normal, inward) = (self.point(along), self.strip.normal(along), self.strip.inward(along));
+        let (point, normal) = (self.point(along), self.strip.normal(along));
+        let inward = self.strip.inward(along, slope(&self.posterior.curve, along));
         let seen = self.footprint * lattice_line::inwards_per_radian(point, normal, inward);
         let cosine = normal.dot(&-point.normalize()).clamp(LEAST_COSINE, 1.0);
         let by_range = self.side_face.is_seen(point, normal, inward);
@@ -398,7 +424,47 @@ fn solve(normal: CurveFit) -> Option<MostLikely> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::contrast::tests::crossing;
     use super::*;
+    use crate::PlateSpec;
+    use crate::extract::Crossing;
+
+    /// An edge that crosses a column of the lattice every 0.4 m: the base curve follows the staircase of the middles.
+    #[test]
+    fn the_side_face_has_the_direction_of_the_edge() {
+        let (step, turn) = (5e-3, 0.0125);
+        let sampling = Sampling { step, angle: 6e-4, noise: 1e-3 };
+        let spec = PlateSpec {
+            width: 1.6,
+            height: 2.0,
+            thickness: 0.04,
+            face_inset: 0.0,
+            root_face: 0.0,
+            u_axis: None,
+            region: None,
+        };
+        let on_edge = |x: f64| Vec3::new(x, 6.0 + turn * x, -3.0);
+        let crossings = (-80..=80).map(|k| {
+            let on_edge = on_edge(0.01 * f64::from(k));
+            let at = |y: f64| Vec3::new(on_edge.x, y, on_edge.z);
+            let inside = at(step * (on_edge.y / step).ceil());
+            let crossing = Crossing { inside, outside: inside - Vec3::y() * step, ..crossing(0.5) };
+            ProjectedCrossing { crossing, cell: inside, residual: 0.0, place: [0; 2] }
+        });
+        let ends = [on_edge(-0.8), on_edge(0.8)];
+        let data =
+            EdgeData::new(crossings.collect(), ends, spec.thickness, SideFace::of(&spec), 0.0, sampling)
+                .unwrap();
+        let across = Vec3::new(-turn, 1.0, 0.0).normalize();
+        let most = |slope: &dyn Fn(f64) -> f64| {
+            let off =
+                |line: &LatticeLine| data.strip.inward(line.along, slope(line.along)).cross(&across).norm();
+            data.lines.iter().map(off).fold(0.0, f64::max)
+        };
+        let base = |at: f64| (data.strip.base(at + step) - data.strip.base(at - step)) / (2.0 * step);
+        let (by_course, by_base) = (most(&|at| slope(&data.course, at)), most(&base));
+        assert!(by_course < 2.5e-3 && by_base > 4.0 * by_course, "{by_course} {by_base}");
+    }
 
     #[test]
     fn the_profile_of_the_strain_has_the_mean_one() {

@@ -9,7 +9,8 @@
 //!   too little to be detected. Of three or more mixed pixels in a row, those farther from the first than the spot
 //!   is wide see another edge, that of a strip of background.
 //! - **Visible side face.** Where the plate's side face is visible, the beams are mixed at its silhouette. The distance
-//!   of the silhouette from the edge follows from thickness and bevel (`side_face`). A beam on a side face of a few
+//!   of the silhouette from the edge follows from thickness and bevel (`side_face`). The more obliquely the side face is
+//!   seen the darker it is, and the nearer to the face beams are detected as mixed. A beam on a side face of a few
 //!   millimetres has a range behind the face's continuation in proportion to its distance from the edge; on a bevel the
 //!   ratio is that of the flank or root face it meets. Such a range is a direct observation of the edge.
 //! - **Last cell of the face.** The last cell assigned to the face may itself lie on the side face, within the noise.
@@ -119,6 +120,8 @@ pub(super) struct LatticeLine {
     /// Distance of the plate's silhouette outside of the edge, on the face's continuation; 0 where the side face is
     /// hidden.
     side: f64,
+    /// Width of the side face weighted by its echo ([`Sight::echo_width`](super::side_face::Sight::echo_width)).
+    side_echo: f64,
     /// Noise of the smooth face near its edges, inwards.
     face_noise: f64,
     /// The nearest cell off the face, its distance outside of the edge if it lies on the side face, and the noise of
@@ -133,9 +136,10 @@ pub(super) struct LatticeLine {
 }
 
 impl LatticeLine {
-    /// Places a crossing in its strip.
+    /// Places a crossing in its strip. `slope` is that of the edge in the strip's plane, by the place along it.
     pub(super) fn new(
         strip: &DevelopedStrip,
+        slope: impl Fn(f64) -> f64,
         settled: &ProjectedCrossing,
         side_face: &SideFace,
         Sampling { angle, noise, .. }: Sampling,
@@ -144,7 +148,8 @@ impl LatticeLine {
         let [inside, outside] = [crossing.inside, crossing.outside].map(|p| strip.flatten(p));
         let mixed = crossing.mixed.map(|pixels| pixels.ends.map(|p| strip.flatten(p).y));
         let along = 0.5 * (inside.x + outside.x);
-        let (beam, normal, inward) = (crossing.inside.normalize(), crossing.normal, strip.inward(along));
+        let (beam, normal) = (crossing.inside.normalize(), crossing.normal);
+        let inward = strip.inward(along, slope(along));
         let per_radian = inwards_per_radian(crossing.inside, normal, inward);
         let sight = side_face.seen_by(crossing.inside, normal, inward);
         let (off, excess) = match (mixed, crossing.mixed) {
@@ -170,6 +175,7 @@ impl LatticeLine {
             per_angle: angle * per_radian,
             per_step: (inside.y - outside.y).abs() / f64::from(crossing.cells.max(1)),
             side: sight.silhouette,
+            side_echo: sight.echo_width,
             face_noise: FACE_NOISE * noise * inward.dot(&beam).abs(),
             off,
             on_side,
@@ -202,7 +208,26 @@ impl LatticeLine {
     /// Returns the distances inside and outside of the edge up to which a beam is detected as mixed, in parts of its
     /// radius.
     pub(super) fn seen_parts(&self, beam: BeamModel) -> [f64; 2] {
-        self.mixing.map_or([1.0; 2], |mixing| mixing.seen(beam.shape, &beam.contrasts))
+        self.mixing.map_or([1.0; 2], |mixing| mixing.seen(beam.shape, &beam.contrasts, 1.0))
+    }
+
+    /// Returns the distance outside of the silhouette up to which a beam is detected as mixed, metres; negative where a
+    /// dark side face is not detected before the background.
+    ///
+    /// The less of the plate's echo comes from the side face, the nearer to the edge a beam must be. By linear mixing
+    /// this distance is a convex function of the width of the side face. It is bounded from below by its tangent at no
+    /// width and by its limit, a side face wider than the beam; their maximum is taken. Where the contrast is unknown
+    /// that limit is the silhouette.
+    fn seen_outside_silhouette(&self, beam: BeamModel) -> f64 {
+        let seen = beam.footprint * self.per_radian;
+        let outside_face = seen * self.seen_parts(beam)[1];
+        if self.side == 0.0 {
+            return outside_face;
+        }
+        let echo = self.side_echo / self.side;
+        let outside_side_face =
+            self.mixing.map_or(0.0, |mixing| seen * mixing.seen(beam.shape, &beam.contrasts, echo)[1]);
+        (outside_face - (self.side - self.side_echo)).max(outside_side_face)
     }
 
     /// Returns the position of the edge in the beam of its single mixed pixel, in radii, and the derivative by the log
@@ -236,7 +261,8 @@ impl LatticeLine {
     pub(super) fn likelihood(&self, beam: BeamModel) -> EdgeLikelihood {
         let soft = norm(beam.softness * self.per_angle, self.face_noise);
         let seen = beam.footprint * self.per_radian;
-        let [seen_inside, seen_outside] = self.seen_parts(beam).map(|part| part * seen);
+        let seen_inside = seen * self.seen_parts(beam)[0];
+        let seen_outside = self.seen_outside_silhouette(beam);
         let shared = self.edge_in_pixel(beam);
         let of = |terms| EdgeLikelihood { along: self.along, terms, shared };
         let last = EdgeObservation::Last { cell: self.cell, behind: self.behind }.within(self.cell_noise);
@@ -262,7 +288,7 @@ impl LatticeLine {
         let mut below =
             Bound { sure: self.high + outside, likely: self.high - (seen_inside - self.side).max(0.0) };
         if self.beyond == Beyond::Behind {
-            above.sure += self.side;
+            above.sure += self.side + seen_outside.min(0.0);
             above.likely += self.side + seen_outside;
         }
         if let Some((lowest, highest)) = self.mixed {
@@ -300,6 +326,7 @@ fn norm(a: f64, b: f64) -> f64 {
 
 #[cfg(test)]
 pub(super) mod tests {
+    use super::super::beam_shape::tests::power_beyond;
     use super::super::contrast::ContrastDistribution;
     use super::*;
 
@@ -322,6 +349,7 @@ pub(super) mod tests {
             per_angle: 6e-3,
             per_step: 5.7e-3,
             side: 1.35e-3,
+            side_echo: 1.35e-3,
             face_noise: FACE_NOISE * 1.4e-5,
             off: -4e-3,
             on_side: 0.05,
@@ -340,6 +368,35 @@ pub(super) mod tests {
     /// Returns the same line with one mixed pixel that determines the position of the edge.
     pub(crate) fn one_pixel_line(at: f64) -> LatticeLine {
         LatticeLine { mixing: Some(super::super::contrast::tests::half()), ..open_line(Some((at, at))) }
+    }
+
+    /// Exact: the three shares of a beam by a sum over a fine grid, and the distance by bisection.
+    #[test]
+    fn a_dark_side_face_is_detected_less_far_from_the_silhouette() {
+        let (shape, contrasts) = (BeamShape::numbered(0), ContrastDistribution::PRIOR.mean());
+        let beam = BeamModel::of(1e-4, shape, contrasts);
+        let open = one_pixel_line(0.0);
+        let radius = beam.footprint * open.per_radian;
+        let face_alone = open.seen_outside_silhouette(beam) / radius;
+        // Plate over background in the beam.
+        let odds = |outside: f64, width: f64, echo: f64| {
+            let [plate, face] = [outside, outside + width].map(|off| power_beyond(1.0, off));
+            (face + echo * (plate - face)) / (1.0 - plate)
+        };
+        let limit = odds(face_alone, 0.0, 1.0);
+        for (width, echo) in
+            [(0.3, 1.0), (0.3, 0.05), (0.3, 0.5), (0.8, 0.05), (0.8, 0.3), (2.5, 0.05), (2.5, 0.5)]
+        {
+            let side = width * radius;
+            let line = LatticeLine { side, side_echo: echo * side, ..open };
+            let found = line.seen_outside_silhouette(beam) / radius;
+            let (mut low, mut high) = (-1.0, 1.0);
+            for _ in 0..16 {
+                let middle = 0.5 * (low + high);
+                *(if odds(middle, width, echo) > limit { &mut low } else { &mut high }) = middle;
+            }
+            assert!(found < low + 4e-3 && found > low - 0.03, "{width} {echo}: {found} {low}");
+        }
     }
 
     /// Returns the likelihood of an edge `far` inside of the last cell of the face, over that at the cell, with 0.7 mm

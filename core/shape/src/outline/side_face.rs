@@ -2,13 +2,14 @@
 //!
 //! In: thickness, face inset and root face of the plate file. Out, for each lattice line ([`Sight`]): the distance
 //! outside of the edge, on the face's continuation, of a beam whose range is a given amount behind that continuation;
-//! and the distance of the plate's silhouette.
+//! the distance of the plate's silhouette; and the visible width of the side face weighted by its echo.
 //!
 //! Across the edge the side face is a polyline in (o, z), where o is the distance outside of the face's edge and z the
 //! depth below the face. Its corners are (0, 0), (inset, flank), (inset, flank + root face), (0, thickness). Per unit
 //! of range a beam covers the depth c and the distance s inwards. A beam that ends on the side face, at a range e
 //! behind the face's continuation, has z = c e and met the continuation x = o + s e outside of the edge. On each strip
-//! of the polyline o is linear in z, hence dx/de = s + c do/dz. A square side face has o = 0. Own.
+//! of the polyline o is linear in z, hence dx/de = s + c do/dz. A square side face has o = 0. The echo of a strip
+//! relative to that of the face is the ratio of the cosines of their incidence (Lambert's law). Own.
 
 use crate::{PlateSpec, Vec3};
 
@@ -53,7 +54,7 @@ impl SideFace {
         let (per_range, depth_per_range) = (inward.dot(&beam), -normal.dot(&beam));
         let (inwards, height) = (inward.dot(&point), -normal.dot(&point));
         let mut pieces = [Piece { from: f64::INFINITY, outside: 0.0, per_range: 0.0 }; STRIPS];
-        let (mut silhouette, mut start) = (0.0, [0.0; 2]);
+        let (mut silhouette, mut echo_width, mut start) = (0.0, 0.0, [0.0; 2]);
         for (k, (piece, end)) in pieces.iter_mut().zip(self.ends).enumerate() {
             let [[from_out, from_depth], [out, depth]] = [start, end];
             // The beam through (out, depth) meets the face's plane at height / (height + depth) of its way.
@@ -62,9 +63,12 @@ impl SideFace {
                 // Turned away from the scanner, as are all strips that follow, or of no height.
                 continue;
             }
+            let (along, down) = (out - from_out, depth - from_depth);
+            let cosine = (per_range * down + depth_per_range * along) / along.hypot(down);
+            echo_width += (outside - silhouette) * (cosine / depth_per_range).clamp(0.0, 1.0);
             silhouette = f64::max(silhouette, outside);
             let from = from_depth / depth_per_range;
-            let slope = (out - from_out) / (depth - from_depth);
+            let slope = along / down;
             *piece = Piece {
                 from,
                 outside: from_out + from * per_range,
@@ -73,7 +77,8 @@ impl SideFace {
             start = end;
         }
         let seen = silhouette > DIRECTION * self.thickness;
-        Sight { silhouette: if seen { silhouette } else { 0.0 }, pieces }
+        let [silhouette, echo_width] = [silhouette, echo_width].map(|width| if seen { width } else { 0.0 });
+        Sight { silhouette, echo_width, pieces }
     }
 }
 
@@ -94,6 +99,9 @@ pub(super) struct Sight {
     /// Distance outside of the edge, on the face's continuation, at which the plate ends; 0 where its side face is
     /// hidden.
     pub(super) silhouette: f64,
+    /// Width, on the face's continuation, over which a surface as bright as the face returns the echo of the visible
+    /// side face, and at most the visible width.
+    pub(super) echo_width: f64,
     pieces: [Piece; STRIPS],
 }
 
@@ -167,6 +175,23 @@ mod tests {
         assert!(!SideFace::of(&spec(0.0, 0.0)).is_seen(Vec3::new(-1.0, 0.0, -3.6), far.1, far.2));
         // Without a root face the flanks meet.
         check(&SideFace::of(&spec(0.0104, 0.0)), 6.0, &[[0.0052, 0.009], [0.0052, 0.027]]);
+    }
+
+    #[test]
+    fn the_echo_of_a_side_face_is_that_of_its_incidence() {
+        let square = SideFace::of(&spec(0.0, 0.0));
+        // At 4.8 degrees to the side face and at 85.2 to the face, of which it is 12 times as dark.
+        let seen = sight(&square, 0.3, 3.6);
+        assert!((seen.echo_width - seen.silhouette / 12.0).abs() < 1e-15, "{seen:?}");
+        let bright = sight(&square, 6.0, 3.6);
+        assert_eq!(bright.echo_width, bright.silhouette);
+        // From above, the flank of a bevel of 29.4 degrees alone.
+        let flank = sight(&SideFace::of(&spec(0.009, 0.004)), 0.0, 3.6);
+        assert!(
+            (flank.echo_width / flank.silhouette - 0.009 / 0.009_f64.hypot(0.016)).abs() < 1e-12,
+            "{flank:?}"
+        );
+        assert_eq!(sight(&square, -1.0, 3.6).echo_width, 0.0);
     }
 
     #[test]

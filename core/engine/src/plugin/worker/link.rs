@@ -305,7 +305,7 @@ impl Link {
             match socket.receive(Some(until), &mut self.buffer) {
                 Received::Message(ToHost::Log { job, level, text }, _) => log(&self.name, job, level, &text),
                 Received::Message(ToHost::Progress { fraction, phase, .. }, _) => {
-                    self.progress.tell(fraction, &printable(&phase));
+                    self.progress.report(fraction, &printable(&phase));
                 }
                 Received::Message(message, _) => return Next::Message(message),
                 Received::Late => return Next::Late,

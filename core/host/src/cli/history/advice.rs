@@ -60,11 +60,11 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<(), CliError> {
         }));
     }
     output::titled(
-        "run | plate | stroke | shown | off the line mm | advised deg | expected of the depth deg | made deg | inside | gap foretold mm | gap mm | inside | followed",
+        "run | plate | stroke | shown | off the line mm | advised deg | expected of the depth deg | made deg | inside | gap expected mm | gap mm | inside | followed",
         scored.iter().map(|(stroke, show, score)| row(stroke, show, score)),
     )?;
     output::line(&format!(
-        "angle of the told depth inside its 95 % interval: {}; gap inside: {}; advice followed: {}; strokes made before their advice was ready: {too_late}",
+        "angle of the reported depth inside its 95 % interval: {}; gap inside: {}; advice followed: {}; strokes made before their advice was ready: {too_late}",
         shares.angle.words(),
         shares.gap.words(),
         shares.followed.words()
@@ -90,8 +90,9 @@ impl Ram {
             record.history.task.templates.first().map(|board| (board.chord, board.limit)).or(ram.board);
         let stroke = record.history.strokes.last();
         let wanted = stroke.and_then(|stroke| stroke.wanted.as_ref()?.depth);
-        ram.offs
-            .extend(stroke.and_then(|stroke| stroke.depth).zip(wanted).map(|(told, wanted)| told - wanted));
+        ram.offs.extend(
+            stroke.and_then(|stroke| stroke.depth).zip(wanted).map(|(reported, wanted)| reported - wanted),
+        );
     }
 
     fn capability(&self) -> Option<([f64; 3], PressCapability)> {

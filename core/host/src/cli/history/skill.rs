@@ -63,7 +63,7 @@ fn row(crew: &CrewSkill) -> Vec<String> {
 fn difference(it: &Difference) -> String {
     let [low, ratio, high] = it.ratio;
     let [a, b] = it.crews;
-    let word = if it.is_significant() { "differ" } else { "no difference can be told" };
+    let word = if it.is_significant() { "differ" } else { "no difference is significant" };
     format!(
         "{}: strokes of crew {a} over crew {b} at equal hardness {ratio:.2} ({low:.2} to {high:.2}): {word}",
         it.class

@@ -51,13 +51,13 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
         output::line(&digest(&subject).map_err(CliError::Failed)?)?;
         return Ok(ExitCode::SUCCESS);
     }
-    let mut told = Ok(());
+    let mut printed = Ok(());
     let mut outcomes = platen_conformance::run(&subject, command.level, command.only.as_deref(), |outcome| {
-        if told.is_ok() {
-            told = tell(common, command, outcome);
+        if printed.is_ok() {
+            printed = print(common, command, outcome);
         }
     });
-    told?;
+    printed?;
     if command.level >= ISOLATION.1
         && command.only.as_ref().is_none_or(|only| ISOLATION.0.contains(only.as_str()))
     {
@@ -66,7 +66,7 @@ pub(super) fn run(common: &Common, command: &Command) -> Result<ExitCode, CliErr
         });
         let why = differs.map(|it| format!("{} has not passed", it.test));
         let outcome = in_both_isolations(common, command, &subject, why);
-        tell(common, command, &outcome)?;
+        print(common, command, &outcome)?;
         outcomes.push(outcome);
     }
     let name = command.library.display().to_string();
@@ -105,10 +105,10 @@ fn plugins_of(plant: &Path) -> Result<Vec<PluginUse>, CliError> {
     Ok(Survey::of(document, plant).plugins.into_iter().map(|(_, used)| used).collect())
 }
 
-fn tell(common: &Common, command: &Command, outcome: &Outcome) -> Result<(), CliError> {
+fn print(common: &Common, command: &Command, outcome: &Outcome) -> Result<(), CliError> {
     let (library, seed) = (command.library.display(), command.seed);
     let again = format!("platen plugins check {library} --only {} --seed {seed}", outcome.test);
-    outcomes::tell(common, outcome, &again)
+    outcomes::print(common, outcome, &again)
 }
 
 /// Name and level of the test that needs a second process of this program.
