@@ -157,7 +157,7 @@ fn a_face_strained_to_the_limit_is_not_bent_again() {
 }
 
 #[test]
-fn no_depth_without_a_die_and_on_a_press_that_does_not_tell_it() {
+fn no_depth_without_a_die_and_on_a_press_that_does_not_report_it() {
     let advice = Case { die: None, ..Case::default() }.advice(|_, _| 0.0);
     says(&advice, "names no [[die]]");
     assert_eq!((bend(&advice).depth, bend(&advice).depth_not_beyond), (None, None));

@@ -156,7 +156,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_comes_back_and_every_fault_of_one_is_told() {
+    fn a_file_comes_back_and_every_fault_of_one_is_reported() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("cal.toml");
         for calibration in [calibration(), Calibration { sigma_true: None, ..calibration() }] {

@@ -338,7 +338,7 @@ mod tests {
     }
 
     #[test]
-    fn a_valid_result_is_told_by_the_bits_that_there_are() {
+    fn a_valid_result_is_known_by_the_bits_that_there_are() {
         let counting = map_markdown(&press());
         let all = "exactly one of status_pass, status_fail, status_cannot_tell and status_not_measured is 1";
         assert!(counting.contains(all), "{counting}");
@@ -348,7 +348,7 @@ mod tests {
     }
 
     #[test]
-    fn a_press_that_does_not_count_is_told_so() {
+    fn the_page_of_a_press_that_does_not_count_states_it() {
         let mut bare = press();
         bare.map = RegisterMap::word();
         let page = map_markdown(&bare);

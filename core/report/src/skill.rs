@@ -369,7 +369,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_told_of_few_plates() {
+    fn nothing_is_reported_of_few_plates() {
         let mut random = fastrand::Rng::with_seed(1);
         let mut all = plates(&mut random, 1, 0.0, 0.4);
         all.extend(plates(&mut random, 2, 0.0, 0.4).into_iter().take(LEAST_PLATES - 1));

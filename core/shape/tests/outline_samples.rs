@@ -61,7 +61,7 @@ fn a_hint_between_two_edges_and_another_size_are_refused() {
 
 /// Crossings nearer to one edge than a limit are removed, up to a margin from its ends.
 #[test]
-fn an_edge_seen_at_its_ends_alone_is_told_and_one_not_seen_is_refused() {
+fn an_edge_seen_at_its_ends_alone_is_reported_and_one_not_seen_is_refused() {
     let sample = support::read(&samples::plates()[0]);
     let patch = support::extract(&sample, 0..sample.columns.len()).unwrap();
     let corner = |k: usize| support::vec3(&sample.truth["corners_m"][k]);

@@ -51,7 +51,7 @@ fn it_says_where_it_serves_and_shows_the_plate() {
 }
 
 #[test]
-fn it_ends_when_told_over_its_second_port() {
+fn it_ends_by_a_request_over_its_second_port() {
     let (mut child, mut out, _, plate) = press(&[]);
     assert!(ask(&plate, r#"{"do":"stop"}"#).contains("true"));
     assert!(child.wait().unwrap().success());

@@ -265,7 +265,7 @@ fn scans_repeat_bit_for_bit_on_any_number_of_threads() {
 }
 
 #[test]
-fn a_scan_stops_when_told() {
+fn a_scan_stops_when_requested() {
     let mut n = 0;
     let stopped = scan(&target(6.0, 55.0), &narrow(0.05), &Instrument::default(), 2, |_| {
         n += 1;

@@ -212,7 +212,7 @@ fn wrong_plugins_are_refused() {
 }
 
 #[test]
-fn every_fault_of_a_file_is_told_at_its_place() {
+fn every_fault_of_a_file_is_reported_at_its_place() {
     let bench = bench();
     let faulty = bench.write(
         "faulty.toml",

@@ -36,7 +36,7 @@ fn crew(code: u16, seeds: std::ops::Range<u64>, yields: f64, table: &DepthTable)
 /// Found: 2 of 100 pairs differ significantly, hardness of the crews 0.41 and 0.61 mm. Here 20 pairs are tested, as 100
 /// take minutes.
 #[test]
-fn identical_hands_are_not_told_apart_by_their_steel() {
+fn identical_hands_are_not_distinguished_by_their_steel() {
     let table = DepthTable::new();
     let (mut told_apart, mut hardness) = (0, [0.0; 2]);
     for trial in 0..TRIALS {

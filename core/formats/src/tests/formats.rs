@@ -270,7 +270,7 @@ fn an_index_beyond_the_declared_bounds_is_an_error() {
 
 /// Found by fuzzing: the XML parser quotes a line break in the file.
 #[test]
-fn broken_xml_is_told_in_one_line() {
+fn broken_xml_is_reported_in_one_line() {
     let broken = edited(&e57(PLAIN, 1), "\"Structure\">\n", "\"Structure\"/\n");
     check_refused(&broken, "scan.e57", "Failed to parse XML data");
 }

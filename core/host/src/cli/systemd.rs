@@ -158,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn a_folder_of_another_unit_is_told() {
+    fn a_folder_of_another_unit_is_reported() {
         let changes = [("\"../platen-results\"", "\"/var/lib/platen/a/results\"")];
         let needs = needs("sim-plant.toml", &changes, "/var/lib/platen/b");
         assert_eq!(needs.writes, [Path::new("/var/lib/platen/a/results")]);

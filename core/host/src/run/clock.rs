@@ -130,7 +130,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_jump_is_told_once_with_both_times_and_drift_is_none() {
+    fn a_jump_is_reported_once_with_both_times_and_drift_is_none() {
         let start = Instant::now();
         let noon: Timestamp = "2026-05-04T12:00:00Z".parse().unwrap();
         let mut jumps = Jumps::default();

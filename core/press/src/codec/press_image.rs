@@ -285,7 +285,7 @@ mod tests {
     }
 
     #[test]
-    fn zero_tells_nothing_of_what_no_stroke_is_made_without() {
+    fn zero_is_no_value_where_no_stroke_is_made_without_one() {
         let mut words = golden();
         let of = |data: StrokeData| (data.thickness, data.force, data.ram_depth, data.die_id);
         let reported = of(PressImage::decode(&RegisterMap::pph1(), 3, &words).unwrap().data);

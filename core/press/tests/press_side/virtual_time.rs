@@ -448,7 +448,7 @@ async fn listening_and_dry_runs_never_write() {
 }
 
 #[tokio::test(start_paused = true)]
-async fn a_full_disk_stops_no_result_and_is_told() {
+async fn a_full_disk_stops_no_result_and_is_reported() {
     let cell = Cell::new(0);
     let host = cell.start();
     cell.strokes(2).await;

@@ -328,10 +328,10 @@ impl Scene {
             let centre = beam(0.0, 0.0);
             let around = [beam(f, 0.0), beam(-f, 0.0), beam(0.0, f), beam(0.0, -f)];
             let other = around.into_iter().find(|r| (r - centre).abs() > 0.05);
-            let (share, told) = (random.uniform(), random.uniform());
+            let (share, part) = (random.uniform(), random.uniform());
             let range = match (other, self.receiver) {
                 (None, _) => centre,
-                (Some(other), Receiver::Anywhere) if told < 0.75 => share * centre + (1.0 - share) * other,
+                (Some(other), Receiver::Anywhere) if part < 0.75 => share * centre + (1.0 - share) * other,
                 (Some(_), Receiver::Anywhere) => centre,
                 (Some(_), Receiver::Linear { plates }) => {
                     self.mean_range(|x, y| direction(f * x, f * y), plates, std::f64::consts::TAU * share)

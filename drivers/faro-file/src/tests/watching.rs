@@ -108,7 +108,7 @@ fn a_changed_time_is_a_change_though_the_size_stays() {
 }
 
 #[test]
-fn zero_byte_first_is_told_and_content_later_is_taken() {
+fn zero_byte_first_is_reported_and_content_later_is_taken() {
     let mut watch = watch("*", Listing::new());
     watch.poll(Ok(listing(&[("a.e57", 0)])));
     assert_eq!(watch.why(), "a.e57 is empty so far");

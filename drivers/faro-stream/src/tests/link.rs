@@ -52,7 +52,7 @@ fn a_bridge_says_how_long_a_scan_takes() {
 }
 
 #[test]
-fn a_bridge_that_refuses_or_hangs_up_is_told_apart() {
+fn a_bridge_that_refuses_or_hangs_up_is_distinguished() {
     let refusing = serve(|_, _| Some((kind::ERROR, json!({"code": "busy", "text": "held by press-4"}))));
     let refused = ask(&refusing, &request(), &request().settings, &mut None).unwrap_err();
     assert_eq!(refused.to_string(), "the bridge is busy: held by press-4");

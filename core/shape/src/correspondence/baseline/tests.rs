@@ -62,7 +62,7 @@ fn the_measures_of_a_real_blank() {
 }
 
 #[test]
-fn flat_and_rolled_blanks_tell_their_outline() {
+fn the_outline_of_flat_and_rolled_blanks_is_measured() {
     let check = |name: &str, surface: &dyn Fn([f64; 2]) -> [f64; 3], bound: f64| {
         let found = Blank::of_mesh(&bent(&real(), surface).mesh().unwrap()).unwrap();
         let apart = apart(&found, &real());

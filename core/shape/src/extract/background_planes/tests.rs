@@ -66,7 +66,7 @@ fn wrong(window: &Window, kinds: &[Option<bool>]) -> [[usize; 2]; 2] {
 }
 
 /// Asserts that nearly no background cell is classified as mixed, and nearly no cell at the edge as sound.
-fn assert_told(window: &Window, kinds: &[Option<bool>]) {
+fn assert_kinds(window: &Window, kinds: &[Option<bool>]) {
     let [[mixed, background], [sound, edge]] = wrong(window, kinds);
     println!("background taken for mixed: {mixed} of {background}; edge taken for sound: {sound} of {edge}");
     assert!(mixed * 100 < background && sound * 20 < edge && edge > 15);
@@ -76,7 +76,7 @@ fn assert_told(window: &Window, kinds: &[Option<bool>]) {
 fn a_strip_that_narrows_is_background() {
     // The table's strip is 8 cells wide at the bottom and ends at the top.
     let (window, kinds) = scene(0.25, |row| [40.0 - 0.62 * row + 25.0, 40.0 - 0.72 * row + 25.0]);
-    assert_told(&window, &kinds);
+    assert_kinds(&window, &kinds);
 }
 
 #[test]
@@ -86,7 +86,7 @@ fn a_strip_of_one_cell_is_background_where_its_plane_shows_elsewhere() {
         let end = 65.0 - 0.62 * row;
         [end, if row < 64.0 { end - 1.2 } else { end - 12.0 }]
     });
-    assert_told(&window, &kinds);
+    assert_kinds(&window, &kinds);
 }
 
 #[test]
@@ -95,20 +95,20 @@ fn a_strip_of_two_cells_is_background_though_its_plane_shows_nowhere_else() {
         let end = 65.0 - 0.62 * row;
         [end, end - 2.0]
     });
-    assert_told(&window, &kinds);
+    assert_kinds(&window, &kinds);
 }
 
 #[test]
 fn an_edge_without_a_strip_stays_mixed() {
     let (window, kinds) = scene(0.25, |row| [65.0 - 0.62 * row; 2]);
-    assert_told(&window, &kinds);
+    assert_kinds(&window, &kinds);
 }
 
 #[test]
 fn smooth_mixing_along_a_row_stays_mixed() {
     // The plate's edge crosses a column within 80 rows: the ranges down that column are straight.
     let (window, kinds) = scene(0.25, |row| [39.75 + 0.006 * row, -9.0]);
-    assert_told(&window, &kinds);
+    assert_kinds(&window, &kinds);
 }
 
 #[test]
@@ -125,7 +125,7 @@ fn a_cell_amid_the_mixed_ones_of_an_edge_is_mixed() {
         window.points[*index] = (beam * range).into();
     }
     assert!(behind.len() > 5);
-    assert_told(&window, &kinds);
+    assert_kinds(&window, &kinds);
 }
 
 #[test]
@@ -136,7 +136,7 @@ fn a_part_of_the_plate_off_the_component_is_no_background() {
         let end = (40.0 + 0.05 * row as f64) as usize;
         (end..(end + 3).min(80)).for_each(|column| window.own[column * 80 + row] = false);
     }
-    assert_told(&window, &kinds);
+    assert_kinds(&window, &kinds);
 }
 
 #[test]
