@@ -28,24 +28,24 @@ pub fn built() -> &'static Path {
         let test = std::env::current_exe().unwrap_or_default();
         let folder = test.ancestors().nth(2).unwrap_or(Path::new("")).to_path_buf();
         let profile = if folder.ends_with("debug") { "dev" } else { "release" };
-        let mut cargo = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
-        // Variables that the outer cargo sets for this package do not apply to the workspace: they would make ring's
-        // build script run again, and everything that depends on TLS would be compiled twice.
-        for (name, _) in std::env::vars_os() {
-            if name
-                .to_str()
-                .is_some_and(|name| name.starts_with("CARGO_MANIFEST_") || name.starts_with("CARGO_PKG_"))
-            {
-                cargo.env_remove(name);
-            }
-        }
-        let status = cargo
+        let status = cargo()
             .args(["build", "--quiet", "--workspace", "--profile", profile])
             .current_dir(repository())
             .status();
         assert!(status.is_ok_and(|s| s.success()), "the workspace does not build");
         folder
     })
+}
+
+/// Returns cargo without the variables that the outer cargo sets for this package. They would make ring's build script
+/// run again, and everything that depends on TLS would be compiled twice.
+pub fn cargo() -> Command {
+    let mut cargo = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+    let of_package = |name: &str| name.starts_with("CARGO_MANIFEST_") || name.starts_with("CARGO_PKG_");
+    for (name, _) in std::env::vars_os().filter(|(name, _)| name.to_str().is_some_and(of_package)) {
+        cargo.env_remove(name);
+    }
+    cargo
 }
 
 /// Returns a program of this build, with an empty log setting.

@@ -19,7 +19,7 @@ pub struct SplineFit<const D: usize> {
 }
 
 /// A fitted spline with the precision of its coefficients.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct FittedSpline<const D: usize> {
     /// The spline.
     pub spline: TensorSpline<D>,
@@ -43,6 +43,34 @@ pub struct FittedSpline<const D: usize> {
 pub struct Undetermined {
     /// Number of points that were given.
     pub n_points: usize,
+}
+
+impl<const D: usize> FittedSpline<D> {
+    /// Returns the variances of `N` weighted sums of values of the spline, for points whose weights are one over their
+    /// variance. Each term is a place (u, v) and its weight in every sum.
+    #[must_use]
+    pub fn variances<const N: usize>(&self, terms: impl Iterator<Item = ([f64; 2], [f64; N])>) -> [f64; N] {
+        let n_u = self.spline.u.n_coefficients();
+        let mut functionals = vec![[0.0; N]; n_u * self.spline.v.n_coefficients()];
+        for ([u, v], weights) in terms {
+            let (su, sv) = (self.spline.u.local_basis(u), self.spline.v.local_basis(v));
+            for (k, by_v) in sv.value.iter().enumerate() {
+                let row = (sv.first + k) * n_u + su.first;
+                for (functional, by_u) in functionals[row..row + 4].iter_mut().zip(&su.value) {
+                    functional
+                        .iter_mut()
+                        .zip(&weights)
+                        .for_each(|(sum, weight)| *sum += weight * by_u * by_v);
+                }
+            }
+        }
+        let mut solved = functionals.clone();
+        self.precision.solve(&mut solved);
+        std::array::from_fn(|sum| {
+            let products = functionals.iter().zip(&solved).map(|(one, other)| one[sum] * other[sum]);
+            products.sum::<f64>().max(0.0)
+        })
+    }
 }
 
 impl<const D: usize> SplineFit<D> {
@@ -275,5 +303,29 @@ mod tests {
         let mut fit = SplineFit::new(UniformKnots::new(0.0, 1.0, 4), UniformKnots::new(0.0, 1.0, 4));
         fit.add(0.5, 0.5, [1.0], 1.0);
         assert_eq!(fit.solve([1.0]).err(), Some(Undetermined { n_points: 1 }));
+    }
+
+    #[test]
+    fn variances_of_sums_are_those_of_the_inverse() {
+        let fitted = fit(4_000, [9, 7], 0.1, |u, v| (2.0 * u).sin() * v);
+        let (n_u, places) = (fitted.spline.u.n_coefficients(), [[0.02, 1.97], [1.31, 0.4]]);
+        let local = fitted.precision.local_inverse();
+        // Values at one place have a covariance within its 16 coefficients.
+        let known = places.map(|[u, v]| {
+            let (su, sv) = (fitted.spline.u.local_basis(u), fitted.spline.v.local_basis(v));
+            let weight = |k: usize| su.value[k % 4] * sv.value[k / 4];
+            let covariance = |a: usize, b: usize| {
+                let row = &local[(sv.first + a / 4) * n_u + su.first + a % 4];
+                row[(b / 4 + 3 - a / 4) * 7 + b % 4 + 3 - a % 4]
+            };
+            let pairs = (0..256).map(|k| (k / 16, k % 16));
+            pairs.map(|(a, b)| weight(a) * weight(b) * covariance(a, b)).sum::<f64>()
+        });
+        let terms = [(places[0], [1.0, 0.0, 1.0, 1.0]), (places[1], [0.0, 1.0, 1.0, -1.0])];
+        let [first, second, sum, difference] = fitted.variances(terms.into_iter());
+        assert!((first / known[0] - 1.0).abs() < 1e-9, "{first} {}", known[0]);
+        assert!((second / known[1] - 1.0).abs() < 1e-9, "{second} {}", known[1]);
+        assert!(((sum + difference) / (2.0 * (first + second)) - 1.0).abs() < 1e-9, "{sum} {difference}");
+        assert!(sum != difference);
     }
 }

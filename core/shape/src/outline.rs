@@ -165,7 +165,7 @@ pub fn outline(patch: &Patch, spec: &PlateSpec) -> Result<Outline, OutlineError>
         EdgeData::new(crossings, [from, to], spec.thickness, side_face, mean_curvature, sampling)
     };
     let [a, b, c, d] = of_each(side);
-    let mut edges = edge::fit_all([a?, b?, c?, d?], sampling)?;
+    let mut edges = edge::fit_all([a?, b?, c?, d?], &height_field, sampling)?;
     let mut points = near;
     for k in 0..4 {
         let arriving = (k + 3) % 4;

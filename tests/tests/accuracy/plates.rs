@@ -58,7 +58,7 @@ const PLATES: [(&str, Bounds); 8] = [
 const BANDS: Bounds =
     Bounds { corners: 0.92, markers: 0.22, markers_harmonic: 0.27, inside: 0.0106, near_edge: 0.022 };
 
-/// Largest error of a displacement vector, millimetres rms, of the stroke and of the null pair: 0.06 and 0.095 are
+/// Largest error of a displacement vector, millimetres rms, of the stroke and of the null pair: 0.09 and 0.11 are
 /// found.
 const STROKE_MM: f64 = 0.12;
 const NULL_PAIR_MM: f64 = 0.19;

@@ -1,8 +1,8 @@
 //! Tests of `platen plugins new`: each kind in each language builds without changes, passes `platen plugins check`, and
 //! measures a plate.
 //!
-//! `PLATEN_RUST=all` builds all three kinds in Rust (a minute and a half for the libraries that a comparison needs),
-//! otherwise only the scanner.
+//! `PLATEN_RUST=all` builds all three kinds in Rust (half a minute for a comparison's libraries), otherwise only the
+//! scanner.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -25,9 +25,12 @@ fn made(folder: &Path, kind: &str, language: &str) -> PathBuf {
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let file = format!("lib{}.so", name.replace('-', "_"));
     let (mut build, library) = if language == "rust" {
-        let target = platen_tests::built().join("new-plugins");
-        let mut cargo = Command::new(env!("CARGO"));
+        let built = platen_tests::built();
+        let target = built.join("new-plugins");
+        let mut cargo = platen_tests::cargo();
         cargo.args(["build", "--release", "--quiet"]).env("CARGO_TARGET_DIR", &target);
+        // Libraries that the workspace has with the same features are not built again.
+        cargo.env("CARGO_BUILD_BUILD_DIR", built.parent().unwrap());
         (cargo, target.join("release").join(&file))
     } else {
         (Command::new("make"), place.join(&file))

@@ -69,6 +69,9 @@ const LEAST_JUMP: f64 = 0.05;
 /// Largest part of the jump by which a mixed pixel must differ from a surface to be detected.
 const MOST_LIMIT: f64 = 0.45;
 
+/// Log odds of the plate up to which it is detected before a background of unknown contrast: 1.2 % of the echo.
+const USUAL_LIMIT: f64 = 4.4;
+
 /// Least part of the radius up to which a beam is detected as mixed.
 const LEAST_SEEN: f64 = 0.05;
 
@@ -151,6 +154,12 @@ pub(super) fn spread(sizes: Vec<f64>) -> f64 {
         return UNINFORMATIVE;
     }
     ((n * scatter * scatter + weight * expected * expected) / (n + weight)).sqrt()
+}
+
+/// Returns the distance outside of the edge of a plate up to which a beam is detected as mixed before a background of
+/// unknown contrast, in parts of its radius; `echo` is that of the plate there, in parts of the face's.
+pub(super) fn seen_before_unknown(shape: BeamShape, echo: f64) -> f64 {
+    shape.place(USUAL_LIMIT + echo.max(f64::MIN_POSITIVE).ln()).0.max(LEAST_SEEN)
 }
 
 /// Linear mixing along one lattice line before a background plane.

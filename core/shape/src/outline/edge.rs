@@ -10,10 +10,12 @@
 //!   row or column the posterior is sampled (`edge_posterior`).
 //! - An edge is dithered when it crosses so many columns and rows that its position between them is practically random.
 //! - The footprint of the beam and the curve are estimated in turn, the footprint from the mixed pixels (`footprint`).
+//! - The error of the height field moves every crossing along its beam, neighbouring ones together. Its part of the
+//!   standard deviation is that of the weighted sum of the ranges that the fit takes (linear propagation).
 //! - The contrast of each plane of the background is estimated together with the edge, then once more with the results
 //!   of the other edges as its prior (`contrast`).
 
-use nalgebra::{Cholesky, Dyn, Vector2};
+use nalgebra::{Cholesky, DMatrix, Dyn, Vector2};
 use platen_numerics::penalised_curve::{CurveFit, SplineCurve};
 use platen_numerics::uniform_knots::UniformKnots;
 
@@ -25,7 +27,7 @@ use super::developed_strip::DevelopedStrip;
 use super::edge_likelihood::{EdgeLikelihood, NewtonStep};
 use super::edge_posterior::Posterior;
 use super::footprint;
-use super::height_field::LEAST_COSINE;
+use super::height_field::{HeightField, LEAST_COSINE};
 use super::lattice_line::{self, BeamModel, LatticeLine};
 use super::projected_crossing::ProjectedCrossing;
 use super::side_face::SideFace;
@@ -54,11 +56,14 @@ const COMMON: f64 = 5e-5;
 /// footprint (half angle).
 ///
 /// `CONTRAST_SPREAD` holds where mixed pixels determine the contrast, or ranges on a visible side face the edge. With
-/// 0.025 the stated intervals of corners and edges of 240 random scenes hold in 97 %, with 0.035 in 98 %.
+/// 0.01 the stated intervals of corners and edges of 200 random scenes hold in 97.7 %.
 /// Elsewhere `UNKNOWN_SPREAD` is multiplied by the logarithm of one over the cosine of the incidence: the more
 /// obliquely a face is seen, the darker it is.
-const CONTRAST_SPREAD: f64 = 0.025;
+const CONTRAST_SPREAD: f64 = 0.01;
 const UNKNOWN_SPREAD: f64 = 0.1;
+
+/// Number of places along an edge at which the standard deviation of the height field is computed.
+const HEIGHTS: usize = 5;
 
 /// Least number of mixed pixels that determine the contrast.
 const LEAST_PIXELS: usize = 20;
@@ -122,6 +127,21 @@ impl EdgeData {
     }
 }
 
+/// Returns the standard deviations across the edge that are due to the height field, at equal steps from corner to
+/// corner. Its error moves each crossing along the beam, and neighbouring crossings together.
+fn height_sigma(data: &EdgeData, fit: &EdgeFit, height_field: &HeightField) -> [f64; HEIGHTS] {
+    let EdgeData { strip, course, crossings, from, to, .. } = data;
+    let influences: [Vec<f64>; HEIGHTS] =
+        std::array::from_fn(|k| fit.influences(from + (to - from) * k as f64 / (HEIGHTS - 1) as f64));
+    let terms = crossings.iter().enumerate().map(|(line, ProjectedCrossing { crossing, .. })| {
+        let point = 0.5 * (crossing.inside + crossing.outside);
+        let along = fit.lines[line].along;
+        let inwards = strip.inward(along, slope(course, along)).dot(&point.normalize());
+        (point, influences.each_ref().map(|influence| influence[line] * inwards))
+    });
+    height_field.range_sigmas(terms)
+}
+
 /// Returns the prior of an edge curve over a span, with the corners at `corners` along it. `mean_curvature` is that of
 /// all edges of the plate by its membrane strain, 1/m, positive inwards.
 fn prior((start, end): (f64, f64), corners: [f64; 2], mean_curvature: f64) -> CurveFit {
@@ -166,7 +186,11 @@ fn slope(curve: &SplineCurve, along: f64) -> f64 {
 ///
 /// # Errors
 /// [`OutlineError::Edge`] when too little of one is seen.
-pub(super) fn fit_all(mut edges: [EdgeData; 4], sampling: Sampling) -> Result<[Edge; 4], OutlineError> {
+pub(super) fn fit_all(
+    mut edges: [EdgeData; 4],
+    height_field: &HeightField,
+    sampling: Sampling,
+) -> Result<[Edge; 4], OutlineError> {
     let shown = background_strip::shown(edges.each_ref().map(|edge| edge.lines.as_slice()));
     edges.iter_mut().zip(shown).for_each(|(edge, lines)| edge.take_for_strip(lines, sampling));
     // Along an edge that is not dithered all beams may be mixed, or none. Such edges count only where no edge is
@@ -177,8 +201,8 @@ pub(super) fn fit_all(mut edges: [EdgeData; 4], sampling: Sampling) -> Result<[E
     let counted = footprint::counted(&counting, sampling.angle);
     let showing = edges.each_ref().map(|edge| edge.dithered && footprint::is_shown(&edge.lines));
     let prior = &ContrastDistribution::PRIOR;
-    let first_fits = |edges: &[EdgeData; 4], shape| -> Result<[Option<Edge>; 4], OutlineError> {
-        let fit = |k: usize| Edge::fit(&edges[k], (counted, shape), true, prior, sampling);
+    let first_fits = |edges: &[EdgeData; 4], shape| -> Result<[Option<EdgeFit>; 4], OutlineError> {
+        let fit = |k: usize| EdgeFit::new(&edges[k], (counted, shape), true, prior, sampling);
         let [a, b, c, d] = of_each(|k| showing[k].then(|| fit(k)).transpose());
         Ok([a?, b?, c?, d?])
     };
@@ -186,24 +210,25 @@ pub(super) fn fit_all(mut edges: [EdgeData; 4], sampling: Sampling) -> Result<[E
         Ok(first_fits(&edges, shape)?.iter().flatten().map(|edge| edge.log_likelihood).sum())
     })?;
     let mut first = first_fits(&edges, shape)?;
-    let most = footprint::most_of_an_edge(first.iter().flatten().map(|edge| edge.footprint));
-    for (edge, data) in first.iter_mut().zip(&mut edges) {
-        if edge.take_if(|edge| edge.footprint > most).is_some() {
+    let most = footprint::most_of_an_edge(first.iter().flatten().map(|fit| fit.beam.footprint));
+    for (fit, data) in first.iter_mut().zip(&mut edges) {
+        if fit.take_if(|fit| fit.beam.footprint > most).is_some() {
             data.take_for_strip(0..data.lines.len(), sampling);
-        } else if let Some(edge) = edge {
-            let at = |along| edge.posterior.curve.at(along);
-            let lines = background_strip::near_far_edges(&data.lines, at, edge.footprint);
+        } else if let Some(fit) = fit {
+            let at = |along| fit.found.curve.at(along);
+            let lines = background_strip::near_far_edges(&data.lines, at, fit.beam.footprint);
             data.take_for_strip(lines, sampling);
         }
     }
-    let found: Vec<f64> = first.iter().flatten().map(|edge| edge.footprint).collect();
+    let found: Vec<f64> = first.iter().flatten().map(|fit| fit.beam.footprint).collect();
     let common = if found.is_empty() { counted } else { found.iter().sum::<f64>() / found.len() as f64 };
     let [a, b, c, d] = of_each(|k| {
         let others = first.iter().enumerate().filter(|(other, _)| *other != k);
         let prior =
-            ContrastDistribution::combined(others.filter_map(|(_, edge)| Some(&edge.as_ref()?.contrasts)));
+            ContrastDistribution::combined(others.filter_map(|(_, fit)| Some(&fit.as_ref()?.contrasts)));
         let own = first[k].is_some() || !showing[k];
-        Edge::fit(&edges[k], (common, shape), own, &prior, sampling)
+        let fit = EdgeFit::new(&edges[k], (common, shape), own, &prior, sampling)?;
+        Edge::new(&edges[k], fit, (common, &prior), height_field, sampling)
     });
     Ok([a?, b?, c?, d?])
 }
@@ -215,6 +240,79 @@ fn is_dithered(lines: &[LatticeLine], base: impl Fn(f64) -> f64, step: f64) -> b
     LatticeLine::extent(on_it).iter().all(|count| *count >= DITHERED)
 }
 
+/// The most likely curve of an edge with the footprint and contrasts that were estimated together with it.
+struct EdgeFit {
+    lines: Vec<EdgeLikelihood>,
+    found: MostLikely,
+    /// Covariance of the curve's coefficients followed by the contrasts.
+    covariance: DMatrix<f64>,
+    contrasts: ContrastDistribution,
+    beam: BeamModel,
+    /// Logarithm of the likelihood of the footprint where it was estimated at this edge, otherwise 0.
+    log_likelihood: f64,
+}
+
+impl EdgeFit {
+    /// Fits the edge to its crossings. `footprint` is half the angle that a beam sees, radians, and `shape` that of the
+    /// beam; with `own` the footprint is the start value of an estimate at this edge. `known` is the prior of the
+    /// contrasts.
+    ///
+    /// # Errors
+    /// [`OutlineError::Edge`] when too little of it is seen.
+    fn new(
+        data: &EdgeData,
+        (footprint, shape): (f64, BeamShape),
+        own: bool,
+        known: &ContrastDistribution,
+        sampling: Sampling,
+    ) -> Result<Self, OutlineError> {
+        let prior = data.prior.clone().with_parameters(known.planes());
+        let too_few = || data.strip.too_few();
+        let fit = |beam: BeamModel| {
+            let lines: Vec<EdgeLikelihood> = data.lines.iter().map(|l| l.likelihood(beam)).collect();
+            let found = most_likely(&prior, &lines, sampling.step)?;
+            Some((lines, found))
+        };
+        let mut beam = BeamModel::of(footprint, shape, known.mean());
+        let mut log_likelihood = 0.0;
+        let (mut lines, mut found) = fit(beam).ok_or_else(too_few)?;
+        for _ in 0..ROUNDS {
+            let last = beam;
+            beam.contrasts = found.contrasts;
+            beam.mixed_spread = mixed_spread(&lines, &found);
+            if own && footprint > 0.0 {
+                let at = |along| found.curve.at(along);
+                (beam.footprint, log_likelihood) = footprint::at_edge(&data.lines, at, footprint, beam);
+            }
+            // The same beams would give the same curve again: converged.
+            if beam.is_near(&last) {
+                break;
+            }
+            (lines, found) = fit(beam).ok_or_else(too_few)?;
+        }
+        let covariance = found.precision.inverse();
+        let n = found.curve.n_coefficients();
+        let contrasts =
+            ContrastDistribution::of(&found.contrasts, |plane| covariance[(n + plane, n + plane)].sqrt());
+        Ok(Self { lines, found, covariance, contrasts, beam, log_likelihood })
+    }
+
+    /// Returns the derivatives of the curve at `along` by the positions of the edge in each line.
+    fn influences(&self, along: f64) -> Vec<f64> {
+        let MostLikely { curve, contrasts, .. } = &self.found;
+        let n = curve.n_coefficients();
+        let column = self.covariance.columns(0, n) * curve.functional(along);
+        let response = curve.with(column.rows(0, n).into_owned());
+        let influence = |line: &EdgeLikelihood| {
+            let step = line.newton_step(curve.at(line.along), contrasts.logarithms(), 0.0);
+            let here = response.at(line.along);
+            let by_contrast = line.shared.map_or(0.0, |shared| shared.factor * column[n + shared.number]);
+            step.weight * here + step.shared_weight * (here + by_contrast)
+        };
+        self.lines.iter().map(influence).collect()
+    }
+}
+
 /// An edge as a curve in its strip.
 #[derive(Debug, Clone)]
 pub(super) struct Edge {
@@ -223,9 +321,8 @@ pub(super) struct Edge {
     posterior: Posterior,
     /// Half the angle that a beam sees, radians.
     footprint: f64,
-    /// Logarithm of the likelihood of that footprint where it was estimated at this edge, otherwise 0.
-    log_likelihood: f64,
-    contrasts: ContrastDistribution,
+    /// Standard deviations across the edge by the height field, metres, at equal steps from corner to corner.
+    height_sigma: [f64; HEIGHTS],
     /// True when its mixed pixels determine the contrasts.
     contrast_known: bool,
     /// Coverage by the crossings that agree with the curve.
@@ -235,71 +332,38 @@ pub(super) struct Edge {
 }
 
 impl Edge {
-    /// Fits the edge to its crossings. `footprint` is half the angle that a beam sees, radians, and `shape` that of the
-    /// beam; with `own` the footprint is the start value of an estimate at this edge. `known` is the prior of the
-    /// contrasts.
+    /// Builds the edge of a fit. `footprint` and `known` are those with which the fit began.
     ///
     /// # Errors
     /// [`OutlineError::Edge`] when too little of it is seen.
-    pub(super) fn fit(
+    fn new(
         data: &EdgeData,
-        (footprint, shape): (f64, BeamShape),
-        own: bool,
-        known: &ContrastDistribution,
-        sampling: Sampling,
+        fit: EdgeFit,
+        (footprint, known): (f64, &ContrastDistribution),
+        height_field: &HeightField,
+        Sampling { step, .. }: Sampling,
     ) -> Result<Self, OutlineError> {
-        let step = sampling.step;
-        let EdgeData { strip, lines, prior, from, to, .. } = data;
+        let height_sigma = height_sigma(data, &fit, height_field);
+        let EdgeFit { lines, found, covariance, beam, .. } = fit;
+        let EdgeData { strip, prior, from, to, .. } = data;
         let (from, to) = (*from, *to);
-        let with_contrasts = prior.clone().with_parameters(known.planes());
-        let too_few = || strip.too_few();
-        let fit = |beam: BeamModel| {
-            let used: Vec<EdgeLikelihood> = lines.iter().map(|l| l.likelihood(beam)).collect();
-            let found = most_likely(&with_contrasts, &used, step)?;
-            Some((used, found))
-        };
-        let mut beam = BeamModel::of(footprint, shape, known.mean());
-        let mut log_likelihood = 0.0;
-        let (mut used, mut found) = fit(beam).ok_or_else(too_few)?;
-        for _ in 0..ROUNDS {
-            let last = beam;
-            beam.contrasts = found.contrasts;
-            beam.mixed_spread = mixed_spread(&used, &found);
-            if own && footprint > 0.0 {
-                let at = |along| found.curve.at(along);
-                (beam.footprint, log_likelihood) = footprint::at_edge(lines, at, footprint, beam);
-            }
-            // The same beams would give the same curve again: converged.
-            if beam.is_near(&last) {
-                break;
-            }
-            (used, found) = fit(beam).ok_or_else(too_few)?;
-        }
-        let MostLikely { curve, contrasts, precision } = found;
-        let covariance = precision.inverse();
-        let n = curve.n_coefficients();
-        let contrasts =
-            ContrastDistribution::of(&contrasts, |plane| covariance[(n + plane, n + plane)].sqrt());
         let posterior = if data.dithered {
-            Posterior::laplace(curve, &covariance)
+            Posterior::laplace(found.curve, &covariance)
         } else {
-            Posterior::sampled(&curve, prior, lines, [from, to], BeamModel { footprint, ..beam }, known, step)
-                .ok_or_else(too_few)?
+            let beam = BeamModel { footprint, ..beam };
+            Posterior::sampled(&found.curve, prior, &data.lines, [from, to], beam, known, step)
+                .ok_or_else(|| strip.too_few())?
         };
-        let agreeing = used.iter().filter(|b| b.agrees(posterior.curve.at(b.along), step));
+        let agreeing = lines.iter().filter(|b| b.agrees(posterior.curve.at(b.along), step));
         let seen = Coverage::new(agreeing.map(|b| b.along), step);
-        let n_odds = lines.iter().filter(|line| line.has_odds()).count();
-        let contrast_known = data.dithered && beam.mixes_linearly() && n_odds >= LEAST_PIXELS;
-        let footprint = beam.footprint;
-        let (strip, side_face) = (strip.clone(), data.side_face);
+        let n_odds = data.lines.iter().filter(|line| line.has_odds()).count();
         Ok(Self {
-            strip,
-            side_face,
+            strip: strip.clone(),
+            side_face: data.side_face,
             posterior,
-            footprint,
-            log_likelihood,
-            contrasts,
-            contrast_known,
+            footprint: beam.footprint,
+            height_sigma,
+            contrast_known: data.dithered && beam.mixes_linearly() && n_odds >= LEAST_PIXELS,
             seen,
             from,
             to,
@@ -328,7 +392,11 @@ impl Edge {
 
     /// Returns the standard deviation across the edge, metres.
     pub(super) fn sigma(&self, along: f64) -> f64 {
-        self.posterior.variance(along).sqrt().hypot(COMMON).hypot(self.contrast_sigma(along))
+        let share = ((along - self.from) / (self.to - self.from)).clamp(0.0, 1.0) * (HEIGHTS - 1) as f64;
+        let below = (share as usize).min(HEIGHTS - 2);
+        let [low, high] = [self.height_sigma[below], self.height_sigma[below + 1]];
+        let by_height = low + (share - below as f64) * (high - low);
+        self.posterior.variance(along).sqrt().hypot(COMMON).hypot(self.contrast_sigma(along)).hypot(by_height)
     }
 
     /// Returns the part of the standard deviation that is due to the contrast, metres; its error has the same sign at
@@ -443,12 +511,13 @@ mod tests {
             u_axis: None,
             region: None,
         };
-        let on_edge = |x: f64| Vec3::new(x, 6.0 + turn * x, -3.0);
+        let on_edge = |x: f64| Vec3::new(x, turn * x - 6.0, -3.0);
         let crossings = (-80..=80).map(|k| {
             let on_edge = on_edge(0.01 * f64::from(k));
             let at = |y: f64| Vec3::new(on_edge.x, y, on_edge.z);
             let inside = at(step * (on_edge.y / step).ceil());
-            let crossing = Crossing { inside, outside: inside - Vec3::y() * step, ..crossing(0.5) };
+            let outside = inside - Vec3::y() * step;
+            let crossing = Crossing { inside, outside, mixed: None, ..crossing(0.5) };
             ProjectedCrossing { crossing, cell: inside, residual: 0.0, place: [0; 2] }
         });
         let ends = [on_edge(-0.8), on_edge(0.8)];
@@ -464,6 +533,19 @@ mod tests {
         let base = |at: f64| (data.strip.base(at + step) - data.strip.base(at - step)) / (2.0 * step);
         let (by_course, by_base) = (most(&|at| slope(&data.course, at)), most(&base));
         assert!(by_course < 2.5e-3 && by_base > 4.0 * by_course, "{by_course} {by_base}");
+        // All crossings moved alike move the edge by as much.
+        let fit = EdgeFit::new(
+            &data,
+            (1e-4, BeamShape::numbered(0)),
+            false,
+            &ContrastDistribution::PRIOR,
+            sampling,
+        )
+        .unwrap();
+        for along in [data.from, 0.5 * (data.from + data.to), data.to] {
+            let whole: f64 = fit.influences(along).iter().sum();
+            assert!((whole - 1.0).abs() < 3e-5, "{along}: {whole}");
+        }
     }
 
     #[test]

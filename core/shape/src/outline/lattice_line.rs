@@ -216,8 +216,7 @@ impl LatticeLine {
     ///
     /// The less of the plate's echo comes from the side face, the nearer to the edge a beam must be. By linear mixing
     /// this distance is a convex function of the width of the side face. It is bounded from below by its tangent at no
-    /// width and by its limit, a side face wider than the beam; their maximum is taken. Where the contrast is unknown
-    /// that limit is the silhouette.
+    /// width and by its limit, a side face wider than the beam; their maximum is taken.
     fn seen_outside_silhouette(&self, beam: BeamModel) -> f64 {
         let seen = beam.footprint * self.per_radian;
         let outside_face = seen * self.seen_parts(beam)[1];
@@ -225,9 +224,11 @@ impl LatticeLine {
             return outside_face;
         }
         let echo = self.side_echo / self.side;
-        let outside_side_face =
-            self.mixing.map_or(0.0, |mixing| seen * mixing.seen(beam.shape, &beam.contrasts, echo)[1]);
-        (outside_face - (self.side - self.side_echo)).max(outside_side_face)
+        let outside_side_face = match self.mixing {
+            Some(mixing) => mixing.seen(beam.shape, &beam.contrasts, echo)[1],
+            None => contrast::seen_before_unknown(beam.shape, echo),
+        };
+        (outside_face - (self.side - self.side_echo)).max(seen * outside_side_face)
     }
 
     /// Returns the position of the edge in the beam of its single mixed pixel, in radii, and the derivative by the log
