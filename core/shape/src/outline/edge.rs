@@ -11,7 +11,7 @@
 //! - An edge is dithered when it crosses so many columns and rows that its position between them is practically random.
 //! - The footprint of the beam and the curve are estimated in turn, the footprint from the mixed pixels (`footprint`).
 //! - The error of the height field moves every crossing along its beam, neighbouring ones together. Its part of the
-//!   standard deviation is that of the weighted sum of the ranges that the fit takes (linear propagation).
+//!   standard deviation follows from the law of propagation of uncertainty (JCGM 100:2008, 5.2.2).
 //! - The contrast of each plane of the background is estimated together with the edge, then once more with the results
 //!   of the other edges as its prior (`contrast`).
 
