@@ -131,13 +131,12 @@ impl EdgeData {
 /// corner. Its error moves each crossing along the beam, and neighbouring crossings together.
 fn height_sigma(data: &EdgeData, fit: &EdgeFit, height_field: &HeightField) -> [f64; HEIGHTS] {
     let EdgeData { strip, course, crossings, from, to, .. } = data;
-    let influences: [Vec<f64>; HEIGHTS] =
-        std::array::from_fn(|k| fit.influences(from + (to - from) * k as f64 / (HEIGHTS - 1) as f64));
-    let terms = crossings.iter().enumerate().map(|(line, ProjectedCrossing { crossing, .. })| {
+    let places = std::array::from_fn(|k| from + (to - from) * k as f64 / (HEIGHTS - 1) as f64);
+    let lines = crossings.iter().zip(&fit.lines).zip(fit.influences(places));
+    let terms = lines.map(|((ProjectedCrossing { crossing, .. }, line), influences)| {
         let point = 0.5 * (crossing.inside + crossing.outside);
-        let along = fit.lines[line].along;
-        let inwards = strip.inward(along, slope(course, along)).dot(&point.normalize());
-        (point, influences.each_ref().map(|influence| influence[line] * inwards))
+        let inwards = strip.inward(line.along, slope(course, line.along)).dot(&point.normalize());
+        (point, influences.map(|influence| influence * inwards))
     });
     height_field.range_sigmas(terms)
 }
@@ -297,17 +296,21 @@ impl EdgeFit {
         Ok(Self { lines, found, covariance, contrasts, beam, log_likelihood })
     }
 
-    /// Returns the derivatives of the curve at `along` by the positions of the edge in each line.
-    fn influences(&self, along: f64) -> Vec<f64> {
+    /// Returns, for each line, the derivatives of the curve at `places` along it by the position of the edge in the line.
+    fn influences<const N: usize>(&self, places: [f64; N]) -> Vec<[f64; N]> {
         let MostLikely { curve, contrasts, .. } = &self.found;
         let n = curve.n_coefficients();
-        let column = self.covariance.columns(0, n) * curve.functional(along);
-        let response = curve.with(column.rows(0, n).into_owned());
+        let responses = places.map(|along| {
+            let column = self.covariance.columns(0, n) * curve.functional(along);
+            (curve.with(column.rows(0, n).into_owned()), column)
+        });
         let influence = |line: &EdgeLikelihood| {
             let step = line.newton_step(curve.at(line.along), contrasts.logarithms(), 0.0);
-            let here = response.at(line.along);
-            let by_contrast = line.shared.map_or(0.0, |shared| shared.factor * column[n + shared.number]);
-            step.weight * here + step.shared_weight * (here + by_contrast)
+            responses.each_ref().map(|(response, column)| {
+                let here = response.at(line.along);
+                let by_contrast = line.shared.map_or(0.0, |shared| shared.factor * column[n + shared.number]);
+                step.weight * here + step.shared_weight * (here + by_contrast)
+            })
         };
         self.lines.iter().map(influence).collect()
     }
@@ -543,7 +546,7 @@ mod tests {
         )
         .unwrap();
         for along in [data.from, 0.5 * (data.from + data.to), data.to] {
-            let whole: f64 = fit.influences(along).iter().sum();
+            let whole: f64 = fit.influences([along]).iter().map(|[influence]| influence).sum();
             assert!((whole - 1.0).abs() < 3e-5, "{along}: {whole}");
         }
     }

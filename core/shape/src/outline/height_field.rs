@@ -9,6 +9,8 @@
 //! beam, which at 60 degrees of incidence is nearly doubled across the edge; the range of the height field has a
 //! thirtieth. Own; Masuda et al. use the raw samples.
 
+use std::borrow::Cow;
+
 use nalgebra::Vector2;
 use platen_numerics::median::robust_deviation;
 use platen_numerics::simd::dispatch_simd;
@@ -78,7 +80,8 @@ impl HeightField {
             UniformKnots::new(low[k], high[k], n_spans)
         };
         let height = heights.smooth([axis(0), axis(1)])?;
-        let residuals = Heights::of(thinned(patch), &plane).residuals(&height.spline);
+        let singles = (block_side(patch) > 1).then(|| Heights::of(thinned(patch), &plane));
+        let residuals = singles.as_ref().unwrap_or(&heights).residuals(&height.spline);
         Ok(Self { plane, height, noise_scale: spread(&residuals) })
     }
 
@@ -228,10 +231,10 @@ fn block_side(patch: &Patch) -> u32 {
 }
 
 /// Returns the means of blocks of n x n neighbouring samples, with their standard deviations.
-fn block_means(patch: &Patch) -> Vec<Sample> {
+fn block_means(patch: &Patch) -> Cow<'_, [Sample]> {
     let side = block_side(patch);
     if side == 1 {
-        return patch.samples.clone();
+        return Cow::Borrowed(&patch.samples);
     }
     let rows = patch.samples.iter().map(|sample| sample.row / side + 1).max().unwrap_or(0);
     let mut sums = vec![(Vec3::zeros(), 0.0, 0.0); rows as usize];
@@ -250,7 +253,7 @@ fn block_means(patch: &Patch) -> Vec<Sample> {
             }
         }
     }
-    means
+    Cow::Owned(means)
 }
 
 /// Thins the samples to the number that a smooth face requires.

@@ -211,15 +211,13 @@ impl LatticeLine {
         self.mixing.map_or([1.0; 2], |mixing| mixing.seen(beam.shape, &beam.contrasts, 1.0))
     }
 
-    /// Returns the distance outside of the silhouette up to which a beam is detected as mixed, metres; negative where a
-    /// dark side face is not detected before the background.
+    /// Returns the distance outside of the silhouette up to which a beam is detected as mixed, metres. `seen` is the
+    /// radius of the beam, `outside_face` that distance outside of an edge without a side face.
     ///
     /// The less of the plate's echo comes from the side face, the nearer to the edge a beam must be. By linear mixing
     /// this distance is a convex function of the width of the side face. It is bounded from below by its tangent at no
     /// width and by its limit, a side face wider than the beam; their maximum is taken.
-    fn seen_outside_silhouette(&self, beam: BeamModel) -> f64 {
-        let seen = beam.footprint * self.per_radian;
-        let outside_face = seen * self.seen_parts(beam)[1];
+    fn seen_outside_silhouette(&self, beam: BeamModel, seen: f64, outside_face: f64) -> f64 {
         if self.side == 0.0 {
             return outside_face;
         }
@@ -262,8 +260,8 @@ impl LatticeLine {
     pub(super) fn likelihood(&self, beam: BeamModel) -> EdgeLikelihood {
         let soft = norm(beam.softness * self.per_angle, self.face_noise);
         let seen = beam.footprint * self.per_radian;
-        let seen_inside = seen * self.seen_parts(beam)[0];
-        let seen_outside = self.seen_outside_silhouette(beam);
+        let [seen_inside, outside_face] = self.seen_parts(beam).map(|part| part * seen);
+        let seen_outside = self.seen_outside_silhouette(beam, seen, outside_face);
         let shared = self.edge_in_pixel(beam);
         let of = |terms| EdgeLikelihood { along: self.along, terms, shared };
         let last = EdgeObservation::Last { cell: self.cell, behind: self.behind }.within(self.cell_noise);
@@ -289,7 +287,7 @@ impl LatticeLine {
         let mut below =
             Bound { sure: self.high + outside, likely: self.high - (seen_inside - self.side).max(0.0) };
         if self.beyond == Beyond::Behind {
-            above.sure += self.side + seen_outside.min(0.0);
+            above.sure += self.side;
             above.likely += self.side + seen_outside;
         }
         if let Some((lowest, highest)) = self.mixed {
@@ -378,7 +376,7 @@ pub(super) mod tests {
         let beam = BeamModel::of(1e-4, shape, contrasts);
         let open = one_pixel_line(0.0);
         let radius = beam.footprint * open.per_radian;
-        let face_alone = open.seen_outside_silhouette(beam) / radius;
+        let face_alone = open.seen_parts(beam)[1];
         // Plate over background in the beam.
         let odds = |outside: f64, width: f64, echo: f64| {
             let [plate, face] = [outside, outside + width].map(|off| power_beyond(1.0, off));
@@ -390,7 +388,7 @@ pub(super) mod tests {
         {
             let side = width * radius;
             let line = LatticeLine { side, side_echo: echo * side, ..open };
-            let found = line.seen_outside_silhouette(beam) / radius;
+            let found = line.seen_outside_silhouette(beam, radius, face_alone * radius) / radius;
             let (mut low, mut high) = (-1.0, 1.0);
             for _ in 0..16 {
                 let middle = 0.5 * (low + high);
