@@ -22,7 +22,8 @@
 //! | `footprint` | angle that a beam sees, from the mixed pixels | own |
 //! | `beam_shape` | position of an edge in a beam from the power on either side; truncation of the Gaussian beam by maximum likelihood | Siegman 1986, 17.1; own |
 //! | `contrast` | position of an edge within a mixed pixel, by its range and the contrast of plate and background (linear mixing model) | own |
-//! | `edge` | each edge as the penalised spline of largest likelihood, by Newton's method | own |
+//! | `edge` | each edge as the penalised spline of largest likelihood, and its standard deviation | own |
+//! | `edge_fit` | that spline by Newton's method, with footprint and contrasts in turn | own |
 //! | `edge_posterior` | covariance: Laplace's method, or adaptive Metropolis along a lattice line | own |
 //! | `coverage` | stretches along an edge where it was seen | own |
 //!
@@ -40,6 +41,7 @@ mod corners;
 mod coverage;
 mod developed_strip;
 mod edge;
+mod edge_fit;
 mod edge_likelihood;
 mod edge_posterior;
 mod error;

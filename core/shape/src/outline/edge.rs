@@ -1,4 +1,4 @@
-//! Edge curve of maximum penalised likelihood in its developed strip, by Newton's method.
+//! Edge curve of maximum penalised likelihood in its developed strip, and its standard deviation.
 //!
 //! In: the projected crossings of one edge. Out: the edge as a spline curve, and its posterior.
 //!
@@ -9,22 +9,23 @@
 //!   interval except at the few cells where the edge changes rows, and these cells locate it. Where the edge changes no
 //!   row or column the posterior is sampled (`edge_posterior`).
 //! - An edge is dithered when it crosses so many columns and rows that its position between them is practically random.
-//! - The footprint of the beam and the curve are estimated in turn, the footprint from the mixed pixels (`footprint`).
+//! - The footprint of the beam and the curve are estimated in turn (`edge_fit`), the footprint from the mixed pixels
+//!   (`footprint`).
 //! - The error of the height field moves every crossing along its beam, neighbouring ones together. Its part of the
 //!   standard deviation follows from the law of propagation of uncertainty (JCGM 100:2008, 5.2.2).
 //! - The contrast of each plane of the background is estimated together with the edge, then once more with the results
 //!   of the other edges as its prior (`contrast`).
 
-use nalgebra::{Cholesky, DMatrix, Dyn, Vector2};
+use nalgebra::Vector2;
 use platen_numerics::penalised_curve::{CurveFit, SplineCurve};
 use platen_numerics::uniform_knots::UniformKnots;
 
 use super::background_strip;
 use super::beam_shape::BeamShape;
-use super::contrast::{self, ContrastDistribution, Contrasts};
+use super::contrast::ContrastDistribution;
 use super::coverage::Coverage;
 use super::developed_strip::DevelopedStrip;
-use super::edge_likelihood::{EdgeLikelihood, NewtonStep};
+use super::edge_fit::EdgeFit;
 use super::edge_posterior::Posterior;
 use super::footprint;
 use super::height_field::{HeightField, LEAST_COSINE};
@@ -68,15 +69,6 @@ const HEIGHTS: usize = 5;
 /// Least number of mixed pixels that determine the contrast.
 const LEAST_PIXELS: usize = 20;
 
-/// Number of Newton steps with widened likelihoods, largest number of further steps, and the movement that ends them,
-/// metres.
-const WIDENED_STEPS: i32 = 8;
-const STEPS: i32 = 32;
-const STILL: f64 = 1e-7;
-
-/// Rounds of fitting the curve and estimating the beams' footprint and contrasts in turn.
-const ROUNDS: usize = 3;
-
 /// The crossings of an edge in its strip.
 #[derive(Debug, Clone)]
 pub(super) struct EdgeData {
@@ -115,6 +107,20 @@ impl EdgeData {
         let lines: Vec<LatticeLine> = crossings.iter().map(line).collect();
         let dithered = is_dithered(&lines, |along| strip.base(along), sampling.step);
         Ok(Self { strip, side_face, crossings, course, lines, dithered, prior, from, to })
+    }
+
+    /// Fits the edge ([`EdgeFit::new`]).
+    ///
+    /// # Errors
+    /// [`OutlineError::Edge`] when too little of it is seen.
+    fn fit(
+        &self,
+        beam: (f64, BeamShape),
+        own: bool,
+        known: &ContrastDistribution,
+        step: f64,
+    ) -> Result<EdgeFit, OutlineError> {
+        EdgeFit::new((&self.prior, &self.lines), beam, own, known, step).ok_or_else(|| self.strip.too_few())
     }
 
     /// Replaces lines, given by their numbers, by those beside a strip of background narrower than a beam.
@@ -201,7 +207,7 @@ pub(super) fn fit_all(
     let showing = edges.each_ref().map(|edge| edge.dithered && footprint::is_shown(&edge.lines));
     let prior = &ContrastDistribution::PRIOR;
     let first_fits = |edges: &[EdgeData; 4], shape| -> Result<[Option<EdgeFit>; 4], OutlineError> {
-        let fit = |k: usize| EdgeFit::new(&edges[k], (counted, shape), true, prior, sampling);
+        let fit = |k: usize| edges[k].fit((counted, shape), true, prior, sampling.step);
         let [a, b, c, d] = of_each(|k| showing[k].then(|| fit(k)).transpose());
         Ok([a?, b?, c?, d?])
     };
@@ -226,7 +232,7 @@ pub(super) fn fit_all(
         let prior =
             ContrastDistribution::combined(others.filter_map(|(_, fit)| Some(&fit.as_ref()?.contrasts)));
         let own = first[k].is_some() || !showing[k];
-        let fit = EdgeFit::new(&edges[k], (common, shape), own, &prior, sampling)?;
+        let fit = edges[k].fit((common, shape), own, &prior, sampling.step)?;
         Edge::new(&edges[k], fit, (common, &prior), height_field, sampling)
     });
     Ok([a?, b?, c?, d?])
@@ -237,83 +243,6 @@ pub(super) fn fit_all(
 fn is_dithered(lines: &[LatticeLine], base: impl Fn(f64) -> f64, step: f64) -> bool {
     let on_it = lines.iter().filter(|l| l.is_near(base(l.along), step));
     LatticeLine::extent(on_it).iter().all(|count| *count >= DITHERED)
-}
-
-/// The most likely curve of an edge with the footprint and contrasts that were estimated together with it.
-struct EdgeFit {
-    lines: Vec<EdgeLikelihood>,
-    found: MostLikely,
-    /// Covariance of the curve's coefficients followed by the contrasts.
-    covariance: DMatrix<f64>,
-    contrasts: ContrastDistribution,
-    beam: BeamModel,
-    /// Logarithm of the likelihood of the footprint where it was estimated at this edge, otherwise 0.
-    log_likelihood: f64,
-}
-
-impl EdgeFit {
-    /// Fits the edge to its crossings. `footprint` is half the angle that a beam sees, radians, and `shape` that of the
-    /// beam; with `own` the footprint is the start value of an estimate at this edge. `known` is the prior of the
-    /// contrasts.
-    ///
-    /// # Errors
-    /// [`OutlineError::Edge`] when too little of it is seen.
-    fn new(
-        data: &EdgeData,
-        (footprint, shape): (f64, BeamShape),
-        own: bool,
-        known: &ContrastDistribution,
-        sampling: Sampling,
-    ) -> Result<Self, OutlineError> {
-        let prior = data.prior.clone().with_parameters(known.planes());
-        let too_few = || data.strip.too_few();
-        let fit = |beam: BeamModel| {
-            let lines: Vec<EdgeLikelihood> = data.lines.iter().map(|l| l.likelihood(beam)).collect();
-            let found = most_likely(&prior, &lines, sampling.step)?;
-            Some((lines, found))
-        };
-        let mut beam = BeamModel::of(footprint, shape, known.mean());
-        let mut log_likelihood = 0.0;
-        let (mut lines, mut found) = fit(beam).ok_or_else(too_few)?;
-        for _ in 0..ROUNDS {
-            let last = beam;
-            beam.contrasts = found.contrasts;
-            beam.mixed_spread = mixed_spread(&lines, &found);
-            if own && footprint > 0.0 {
-                let at = |along| found.curve.at(along);
-                (beam.footprint, log_likelihood) = footprint::at_edge(&data.lines, at, footprint, beam);
-            }
-            // The same beams would give the same curve again: converged.
-            if beam.is_near(&last) {
-                break;
-            }
-            (lines, found) = fit(beam).ok_or_else(too_few)?;
-        }
-        let covariance = found.precision.inverse();
-        let n = found.curve.n_coefficients();
-        let contrasts =
-            ContrastDistribution::of(&found.contrasts, |plane| covariance[(n + plane, n + plane)].sqrt());
-        Ok(Self { lines, found, covariance, contrasts, beam, log_likelihood })
-    }
-
-    /// Returns, for each line, the derivatives of the curve at `places` along it by the position of the edge in the line.
-    fn influences<const N: usize>(&self, places: [f64; N]) -> Vec<[f64; N]> {
-        let MostLikely { curve, contrasts, .. } = &self.found;
-        let n = curve.n_coefficients();
-        let responses = places.map(|along| {
-            let column = self.covariance.columns(0, n) * curve.functional(along);
-            (curve.with(column.rows(0, n).into_owned()), column)
-        });
-        let influence = |line: &EdgeLikelihood| {
-            let step = line.newton_step(curve.at(line.along), contrasts.logarithms(), 0.0);
-            responses.each_ref().map(|(response, column)| {
-                let here = response.at(line.along);
-                let by_contrast = line.shared.map_or(0.0, |shared| shared.factor * column[n + shared.number]);
-                step.weight * here + step.shared_weight * (here + by_contrast)
-            })
-        };
-        self.lines.iter().map(influence).collect()
-    }
 }
 
 /// An edge as a curve in its strip.
@@ -423,76 +352,6 @@ fn strain_profile(along: f64, [from, to]: [f64; 2]) -> f64 {
     1.5 * (1.0 - from_middle * from_middle).max(0.0)
 }
 
-/// The curve of largest likelihood.
-struct MostLikely {
-    curve: SplineCurve,
-    /// Logarithms of the contrasts of the background's planes.
-    contrasts: Contrasts,
-    /// Cholesky factor of the precision of the curve's coefficients followed by the contrasts.
-    precision: Cholesky<f64, Dyn>,
-}
-
-/// Maximises the likelihood by Newton's method, starting from the middles of the intervals.
-///
-/// The first steps use likelihoods that are widened less and less (continuation); a widened likelihood has a slope far
-/// from the edge. The search never starts from the curve found with another footprint: with 2 mm of noise that curve
-/// may lie at a lesser maximum, 1 mm off, and the footprint estimated there would keep it.
-fn most_likely(prior: &CurveFit, lines: &[EdgeLikelihood], step: f64) -> Option<MostLikely> {
-    let mut normal = prior.clone();
-    for line in lines {
-        let (to, weight) = line.middle(step);
-        normal.add(line.along, to, weight);
-    }
-    let mut found = solve(normal)?;
-    for widened in 0..WIDENED_STEPS {
-        found = newton_step(prior, lines, &found, 2.0 * step * 0.5_f64.powi(widened))?;
-    }
-    for _ in 0..STEPS {
-        let next = newton_step(prior, lines, &found, 0.0)?;
-        let moved = next.curve.distance(&found.curve);
-        found = next;
-        if moved < STILL {
-            break;
-        }
-    }
-    Some(found)
-}
-
-/// Estimates the scatter of the edge positions by the single mixed pixels about the curve, in radii of the beam.
-fn mixed_spread(lines: &[EdgeLikelihood], found: &MostLikely) -> f64 {
-    let size = |line: &EdgeLikelihood| {
-        let shared = line.shared?;
-        let off = shared.off(found.curve.at(line.along), found.contrasts.logarithms());
-        Some((off / shared.radius).abs())
-    };
-    contrast::spread(lines.iter().filter_map(size).collect())
-}
-
-/// Performs one Newton step of the curve and the contrasts.
-fn newton_step(
-    prior: &CurveFit,
-    lines: &[EdgeLikelihood],
-    from: &MostLikely,
-    least_soft: f64,
-) -> Option<MostLikely> {
-    let mut normal = prior.clone();
-    for line in lines {
-        let at = from.curve.at(line.along);
-        let NewtonStep { to, weight, shared_weight } =
-            line.newton_step(at, from.contrasts.logarithms(), least_soft);
-        normal.add(line.along, to, weight);
-        if let Some(shared) = line.shared {
-            normal.add_with(line.along, shared.place, shared_weight, (shared.number, shared.factor));
-        }
-    }
-    solve(normal)
-}
-
-fn solve(normal: CurveFit) -> Option<MostLikely> {
-    let (curve, contrasts, precision) = normal.solve_with_parameters()?;
-    Some(MostLikely { curve, contrasts: Contrasts::of(contrasts.as_slice()), precision })
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::contrast::tests::crossing;
@@ -537,14 +396,8 @@ mod tests {
         let (by_course, by_base) = (most(&|at| slope(&data.course, at)), most(&base));
         assert!(by_course < 2.5e-3 && by_base > 4.0 * by_course, "{by_course} {by_base}");
         // All crossings moved alike move the edge by as much.
-        let fit = EdgeFit::new(
-            &data,
-            (1e-4, BeamShape::numbered(0)),
-            false,
-            &ContrastDistribution::PRIOR,
-            sampling,
-        )
-        .unwrap();
+        let prior = ContrastDistribution::PRIOR;
+        let fit = data.fit((1e-4, BeamShape::numbered(0)), false, &prior, step).unwrap();
         for along in [data.from, 0.5 * (data.from + data.to), data.to] {
             let whole: f64 = fit.influences([along]).iter().map(|[influence]| influence).sum();
             assert!((whole - 1.0).abs() < 3e-5, "{along}: {whole}");
