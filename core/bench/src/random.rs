@@ -16,6 +16,7 @@
 //!
 //! - square edges and normal range errors
 //! - edges with a double-V bevel of 20 to 40 degrees, in half of the scenes with a root face of up to 6 mm
+//! - edges bowed by their cut, as the prior of the edge curve states
 //! - a share of wide range errors
 //! - a table that is visible in one to two rows beyond the far edges
 //! - a person before the nearest corner

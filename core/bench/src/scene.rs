@@ -15,7 +15,7 @@ use platen_model::units::metres;
 use platen_plant::Value;
 use platen_scan::{Column, ScanHeader};
 use platen_shape::extract::Extractor;
-use platen_shape::{Patch, PlateSpec, Vec3};
+use platen_shape::{Blank, Patch, PlateSpec, Vec3};
 
 use crate::accuracy::Truth;
 
@@ -44,6 +44,8 @@ pub(super) struct Scene {
     /// Distance of the face's edge inside the mid-surface's edge, and height of the root face between the flanks of the
     /// bevel, millimetres; 0 for square edges.
     pub(super) bevel_mm: [f64; 2],
+    /// Sagittas of the edges v = 0, u = W, v = H, u = 0, positive outwards, millimetres.
+    pub(super) bows_mm: [f64; 4],
     /// Direction of u, counter-clockwise from the line of sight, degrees.
     pub(super) yaw_deg: f64,
 }
@@ -80,6 +82,8 @@ pub(super) struct Shot {
     pub(super) truth: Truth,
     /// Specification of the plate.
     pub(super) spec: PlateSpec,
+    /// Its blank as it was cut, as an exact scan of it would give it.
+    pub(super) blank: Blank,
 }
 
 impl Scene {
@@ -105,6 +109,11 @@ impl Scene {
         }
     }
 
+    /// Returns the blank as it is cut.
+    fn blank(&self) -> Blank {
+        Blank { bows: self.bows_mm.map(metres), ..self.spec().rectangle() }
+    }
+
     /// Returns the simulator's description of the plate in the pose of this seed.
     fn description(&self, seed: u64) -> String {
         let mut random = fastrand::Rng::with_seed(seed);
@@ -114,8 +123,9 @@ impl Scene {
         let ([width, height, thickness], [inset, root]) = (self.size_mm, self.bevel_mm);
         format!(
             "[blank]\nwidth_mm = {width:?}\nheight_mm = {height:?}\nthickness_mm = {thickness:?}\n\
-             face_inset_mm = {inset:?}\nroot_face_mm = {root:?}\nmarkers_mm = {:?}\n\
+             face_inset_mm = {inset:?}\nroot_face_mm = {root:?}\nbows_mm = {:?}\nmarkers_mm = {:?}\n\
              [shape]\n{}\n[pose]\ncentre_mm = {centre:?}\nyaw_deg = {yaw:?}\n",
+            self.bows_mm,
             self.markers_mm(),
             self.shape,
         )
@@ -135,7 +145,7 @@ impl Scene {
         let columns = scan.by_ref().collect::<Result<_, _>>()?;
         scan.finish()?;
         let truth = Truth::read(&truth).map_err(|e| CliError::Failed(e.to_string()))?;
-        Ok(Shot { header, columns, truth, spec: self.spec() })
+        Ok(Shot { header, columns, truth, spec: self.spec(), blank: self.blank() })
     }
 
     /// Starts the driver with this scene; returns it and the path of the truth file.

@@ -27,6 +27,7 @@ pub(super) fn scenes() -> Vec<Scene> {
         shape: shape.into(),
         centre_mm: [6000.0, 0.0, -3600.0],
         bevel_mm: [0.0; 2],
+        bows_mm: [0.0; 4],
         yaw_deg,
     };
     let usual = [3000.0, 2500.0, 36.0];

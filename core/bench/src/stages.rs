@@ -68,7 +68,7 @@ pub(super) fn shape(
     seen: &Seen,
     flattening: &mut Flattening,
 ) -> Result<Measurement, NotMeasured> {
-    Ok(measure(&seen.patch, &seen.outline, &shot.spec, &shot.spec.rectangle(), flattening, &mut cpu_time)?)
+    Ok(measure(&seen.patch, &seen.outline, &shot.spec, &shot.blank, flattening, &mut cpu_time)?)
 }
 
 /// Extracts and measures.

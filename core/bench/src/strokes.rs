@@ -112,6 +112,7 @@ pub(super) fn errors(
             shape,
             centre_mm: [6000.0, 0.0, -3600.0],
             bevel_mm: [0.0; 2],
+            bows_mm: [0.0; 4],
             yaw_deg: 10.0,
         };
         // Four scans for each seed, with different errors.

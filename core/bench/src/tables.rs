@@ -57,6 +57,7 @@ pub(super) fn scene() -> Scene {
         shape: "shape = \"cylinder\"\nradius_mm = 12000.0\naxis_deg = 110.0".into(),
         centre_mm: [6770.0, 0.0, -3600.0],
         bevel_mm: [0.0; 2],
+        bows_mm: [0.0; 4],
         yaw_deg: 30.0,
     }
 }

@@ -109,34 +109,25 @@ impl CurveFit {
         Self { knots, matrix, right: DVector::zeros(n) }
     }
 
-    /// Builds the equations without data: the curvature is an amplitude times `profile`, and varies about that as white
-    /// noise over `length` with the standard deviation `spread`. The amplitude is given by its mean and standard
-    /// deviation.
+    /// Adds an unknown amplitude times `profile` to the curvature of the prior. The amplitude is given by its mean and
+    /// standard deviation.
     #[must_use]
-    pub fn with_curvature(
-        knots: UniformKnots,
-        profile: impl Fn(f64) -> f64,
-        [mean, amplitude]: [f64; 2],
-        spread: f64,
-        length: f64,
-    ) -> Self {
-        let mut fit = Self::with_prior(knots, Roughness::Curvature, spread, length);
-        let step = knots.step();
-        // The curvatures at the knots are D c / step^2 with the second differences D c of the coefficients c. With the
-        // profile f at the knots the functional is D^T f.
-        let (mut functional, mut square) = (DVector::zeros(knots.n_coefficients()), 0.0);
-        for k in 0..=knots.n_spans() {
-            let value = profile(knots.start() + k as f64 * step);
-            SECOND_DIFFERENCE.iter().enumerate().for_each(|(i, factor)| functional[k + i] += factor * value);
-            square += value * value;
+    pub fn with_curvature(mut self, profile: impl Fn(f64) -> f64, [mean, amplitude]: [f64; 2]) -> Self {
+        let step = self.knots.step();
+        // Coefficients d with this curvature: their second differences are step^2 f with the profile f at the knots.
+        let mut curved = DVector::zeros(self.knots.n_coefficients());
+        for k in 0..=self.knots.n_spans() {
+            let curvature = profile(self.knots.start() + k as f64 * step);
+            curved[k + 2] = 2.0 * curved[k + 1] - curved[k] + step * step * curvature;
         }
-        // Their covariance S = s^2 I + a^2 f f^T has the inverse (I - f f^T a^2 / t) / s^2, and S^-1 f = f / t, with
-        // t = s^2 + a^2 f^T f (Sherman-Morrison formula).
-        let variance = length * spread * spread / step;
-        let total = variance + square * amplitude * amplitude;
-        fit.hold(&functional, -amplitude * amplitude / (total * variance) * step.powi(-4));
-        fit.right += functional * (mean / total * step.powi(-2));
-        fit
+        // The covariance P^-1 grows by a^2 d d^T, the mean by m d: P becomes P - (a^2 / t) P d (P d)^T with
+        // t = 1 + a^2 d^T P d (Sherman-Morrison formula).
+        let weighted = &self.matrix * &curved;
+        let variance = amplitude * amplitude;
+        let total = 1.0 + variance * curved.dot(&weighted);
+        self.right += &weighted * ((mean - variance * curved.dot(&self.right)) / total);
+        self.hold(&weighted, -variance / total);
+        self
     }
 
     /// Appends one parameter for each normal prior, given by mean and standard deviation.
@@ -223,7 +214,8 @@ mod tests {
         let knots = UniformKnots::new(0.0, 3.0, 12);
         let parabola = |x: f64| 0.5 * CURVATURE * x * x;
         let end = |constant: [f64; 2]| {
-            let mut fit = CurveFit::with_curvature(knots, |_| 1.0, constant, 0.003, 0.3);
+            let prior = CurveFit::with_prior(knots, Roughness::Curvature, 0.003, 0.3);
+            let mut fit = prior.with_curvature(|_| 1.0, constant);
             (0..=150).map(|k| 0.01 * f64::from(k)).for_each(|x| fit.add(x, parabola(x), 1e10));
             let (curve, precision) = fit.solve().unwrap();
             let functional = curve.functional(3.0);
@@ -239,7 +231,8 @@ mod tests {
     #[test]
     fn without_values_the_curvature_is_that_of_the_prior() {
         let knots = UniformKnots::new(0.0, 3.0, 12);
-        let mut fit = CurveFit::with_curvature(knots, |x| 6.0 * x, [0.01, 0.02], 0.0003, 0.3);
+        let prior = CurveFit::with_prior(knots, Roughness::Curvature, 0.0003, 0.3);
+        let mut fit = prior.with_curvature(|x| 6.0 * x, [0.01, 0.02]);
         [0.0, 1.0].iter().for_each(|x| fit.add(*x, 0.0, 1e10));
         let (curve, precision) = fit.solve().unwrap();
         let functional = curve.functional(2.0);

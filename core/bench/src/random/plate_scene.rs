@@ -20,6 +20,9 @@ const PLATE_MM: f64 = -3200.0;
 const REFLECTIVITY: [f64; 2] = [0.1, 0.6];
 /// Share of wide range errors and their factor in the family of that name.
 const TAILS: [f64; 2] = [0.05, 4.0];
+/// Standard deviation of the sagitta of an edge 3 m long, millimetres, in the family of bowed edges: the camber of the
+/// prior of the edge curve (`outline::edge`).
+const BOW_MM: f64 = 1.0;
 /// Radii of a target, as a share of the plate's: a plate that is not bent enough, and one that is bent too far.
 const TARGET_SHARES: [f64; 2] = [0.95, 1.05];
 /// Radius of the target of a plate with bend bands, metres: the mean of its curvature between them.
@@ -142,10 +145,11 @@ impl RandomScene {
         let cyclic_mm = given.cyclic_mm.unwrap_or(drawn_mm);
         let setting = Setting { step_deg, noise_mm, ..Setting::of_accuracy(noise_mm, seed) };
         let bevel_mm = if family == Family::Bevel { bevel(&mut random, size_mm[2]) } else { [0.0; 2] };
+        let bows_mm = if family == Family::Bowed { bows(&mut random, size_mm) } else { [0.0; 4] };
         let tails = if family == Family::Tails { TAILS } else { [0.0, 1.0] };
         let strip_deg = if family == Family::Strip { step_deg * (1.0 + random.f64()) } else { 0.0 };
         let hidden_by = if family == Family::Hidden { "person at corner" } else { hidden_by };
-        let scene = Scene { name: name.into(), size_mm, shape, centre_mm, bevel_mm, yaw_deg };
+        let scene = Scene { name: name.into(), size_mm, shape, centre_mm, bevel_mm, bows_mm, yaw_deg };
         let [dark, bright] = REFLECTIVITY;
         // From a separate generator, so that scenes equal those of versions that did not draw this value.
         let drawn = dark * (bright / dark).powf(Rng::with_seed(!seed).f64());
@@ -193,9 +197,10 @@ impl RandomScene {
         let [x, ..] = self.scene.centre_mm;
         let strip =
             if self.strip_deg > 0.0 { format!(", strip {:.3} deg", self.strip_deg) } else { String::new() };
-        let edges = match self.scene.bevel_mm {
-            [0.0, _] => String::new(),
-            [inset, root] => format!(", face inset {inset}, root face {root}"),
+        let edges = match (self.scene.bevel_mm, self.scene.bows_mm) {
+            ([0.0, _], [0.0, ..]) => String::new(),
+            ([0.0, _], bows) => format!(", bows {bows:.1?}"),
+            ([inset, root], _) => format!(", face inset {inset}, root face {root}"),
         };
         format!(
             "{} {w:.0} x {h:.0} x {t:.0}{edges}, {:.1} m away, {:.1} m high, yaw {:.0}, {:.3} deg, reflectivity {:.2}, noise {:.1}, cyclic {:.2}, hidden by {}{strip}",
@@ -218,6 +223,14 @@ fn bevel(random: &mut Rng, thickness: f64) -> [f64; 2] {
     let root = if random.bool() { (6.0 * random.f64()).round() } else { 0.0 };
     let inset = 0.5 * (thickness - root) * angle_deg.to_radians().tan();
     [(10.0 * inset).round() / 10.0, root]
+}
+
+/// Draws the sagittas of the edges of a plate, millimetres, uniform with the standard deviation of the prior. That of a
+/// constant curvature grows with the square of the length.
+fn bows(random: &mut Rng, [width, height, _]: [f64; 3]) -> [f64; 4] {
+    let reach = 3.0_f64.sqrt() * BOW_MM;
+    [width, height, width, height]
+        .map(|length| reach * (length / 3000.0).powi(2) * (2.0 * random.f64() - 1.0))
 }
 
 /// Returns the largest distance of neighbouring samples across an edge, metres: `step` is the angle between beams,
@@ -262,6 +275,26 @@ mod tests {
                 RandomScene::of(Family::Square, Given::default(), seed).words()
             );
         }
+    }
+
+    #[test]
+    fn a_bowed_scene_is_the_square_one_with_bows_of_the_stated_deviation() {
+        let (mut sum, mut n) = (0.0, 0.0);
+        for seed in 0..500 {
+            let of = |family| RandomScene::of(family, Given::default(), seed);
+            let (square, bowed) = (of(Family::Square).scene, of(Family::Bowed).scene);
+            assert_eq!(
+                (square.size_mm, &square.shape, square.yaw_deg),
+                (bowed.size_mm, &bowed.shape, bowed.yaw_deg)
+            );
+            let [width, height, _] = bowed.size_mm;
+            for (bow, length) in bowed.bows_mm.into_iter().zip([width, height, width, height]) {
+                sum += (bow * (3000.0 / length).powi(2)).powi(2);
+                n += 1.0;
+            }
+        }
+        let deviation: f64 = f64::sqrt(sum / n);
+        assert!((deviation - BOW_MM).abs() < 0.03, "{deviation}");
     }
 
     #[test]

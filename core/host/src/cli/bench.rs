@@ -38,6 +38,8 @@ pub enum Family {
     Square,
     /// Edges with a double-V bevel of 20 to 40 degrees
     Bevel,
+    /// Edges bowed by their cut: over 3 m by up to 1.7 mm
+    Bowed,
     /// 5 % of the ranges with errors of four times the standard deviation of the others
     Tails,
     /// A table shows in one to two rows beyond the far edges
