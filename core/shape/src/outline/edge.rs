@@ -69,6 +69,9 @@ const COMMON: f64 = 7e-5;
 const CONTRAST_SPREAD: f64 = 0.01;
 const UNKNOWN_SPREAD: f64 = 0.1;
 
+/// Logarithm of the likelihood ratio from which a rim is taken for sharp: 100 to 1. The beam of a laser has a faint rim.
+const SHARP_RIM: f64 = 4.6;
+
 /// Number of places along an edge at which the standard deviation of the height field is computed.
 const HEIGHTS: usize = 5;
 
@@ -227,7 +230,7 @@ pub(super) fn fit_all(
     let fitted =
         edges.iter().zip(&first).filter_map(|(data, fit)| Some((&data.lines[..], fit.as_ref()?.beam)));
     let sharp = first_fits(&edges, BeamShape::with_sharp_rim())?;
-    if sharp_rim::is_sharp(fitted) || log_likelihood(&sharp) > log_likelihood(&first) {
+    if sharp_rim::is_sharp(fitted) || log_likelihood(&sharp) - log_likelihood(&first) > SHARP_RIM {
         shape = BeamShape::with_sharp_rim();
         first = sharp;
     }
