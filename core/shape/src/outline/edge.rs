@@ -69,9 +69,6 @@ const COMMON: f64 = 7e-5;
 const CONTRAST_SPREAD: f64 = 0.01;
 const UNKNOWN_SPREAD: f64 = 0.1;
 
-/// Logarithm of the likelihood ratio from which a rim is taken for sharp: 100 to 1. The beam of a laser has a faint rim.
-const SHARP_RIM: f64 = 4.6;
-
 /// Number of places along an edge at which the standard deviation of the height field is computed.
 const HEIGHTS: usize = 5;
 
@@ -193,8 +190,8 @@ fn slope(curve: &SplineCurve, along: f64) -> f64 {
 ///
 /// - The footprint is counted from the mixed pixels, then estimated at each edge that has enough suitable lines. The
 ///   mean of these estimates is the start value of the second fit.
-/// - The shape of the beam, the same at all edges, is that of the largest likelihood of these first fits, and a sharp
-///   rim is also tested by the number of weak echoes (`sharp_rim`).
+/// - The shape of the beam, the same at all edges, is that of the largest likelihood of these first fits, unless
+///   missing weak echoes show a sharp rim (`sharp_rim`).
 /// - The footprint is a property of the scanner, not of the edge. An edge with a far larger one than the others has a
 ///   strip of background beside it, whose far edge also mixes the beams. Such an edge is fitted with the footprint of
 ///   the others, and only with the mixed pixels that certainly see the plate. So is a part of an edge with mixed pixels
@@ -224,15 +221,14 @@ pub(super) fn fit_all(
         Ok([a?, b?, c?, d?])
     };
     let mut shape = BeamShape::most_likely(|shape| -> Result<f64, OutlineError> {
-        Ok(log_likelihood(&first_fits(&edges, shape)?))
+        Ok(first_fits(&edges, shape)?.iter().flatten().map(|edge| edge.log_likelihood).sum())
     })?;
     let mut first = first_fits(&edges, shape)?;
     let fitted =
         edges.iter().zip(&first).filter_map(|(data, fit)| Some((&data.lines[..], fit.as_ref()?.beam)));
-    let sharp = first_fits(&edges, BeamShape::with_sharp_rim())?;
-    if sharp_rim::is_sharp(fitted) || log_likelihood(&sharp) - log_likelihood(&first) > SHARP_RIM {
+    if sharp_rim::is_sharp(fitted) {
         shape = BeamShape::with_sharp_rim();
-        first = sharp;
+        first = first_fits(&edges, shape)?;
     }
     let most = footprint::most_of_an_edge(first.iter().flatten().map(|fit| fit.beam.footprint));
     for (fit, data) in first.iter_mut().zip(&mut edges) {
@@ -255,11 +251,6 @@ pub(super) fn fit_all(
         Edge::new(&edges[k], fit, (common, &prior), height_field, sampling)
     });
     Ok([a?, b?, c?, d?])
-}
-
-/// Returns the logarithm of the likelihood of the footprints of all fits.
-fn log_likelihood(fits: &[Option<EdgeFit>; 4]) -> f64 {
-    fits.iter().flatten().map(|fit| fit.log_likelihood).sum()
 }
 
 /// Returns true when the edge, approximately at `base`, is dithered: it crosses so many columns and rows of the lattice
