@@ -18,7 +18,6 @@
 //! | `lattice_line` | one lattice line across an edge as an observation: interval, mixed pixels, side face | own |
 //! | `background_strip` | lattice lines beside a strip of background narrower than a beam | own |
 //! | `edge_likelihood` | likelihood of an edge position given one lattice line (interval-censored observation) | own |
-//! | `sharp_rim` | whether a beam is mixed up to its rim, by the number of mixed pixels with a weak echo | own |
 //! | `side_face` | square or bevelled side face beside an edge, as a beam meets it | own |
 //! | `footprint` | angle that a beam sees, from the mixed pixels | own |
 //! | `beam_shape` | position of an edge in a beam from the power on either side; truncation of the Gaussian beam by maximum likelihood | Siegman 1986, 17.1; own |
@@ -51,7 +50,6 @@ mod height_field;
 mod lattice_line;
 mod plane;
 mod projected_crossing;
-mod sharp_rim;
 mod side_face;
 mod visible_boundary;
 

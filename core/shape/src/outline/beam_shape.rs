@@ -5,10 +5,6 @@
 //! positions are in parts of the radius at which the beam ends, the footprint, so that the shape changes nothing but
 //! the law between power and position.
 //!
-//! The rim of such a beam is faint: a beam that sees little of a surface returns a weak echo of it, and how far from the
-//! edge it is detected as mixed depends on the brightness of both surfaces. A beam with a sharp rim is detected as mixed
-//! wherever it sees both (`sharp_rim`).
-//!
 //! In: log odds of the power beyond an edge. Out: the position of the edge, and its derivative. The integral over the
 //! beam is tabulated, within 0.002 of the radius. Siegman, "Lasers" (1986), section 17.1, for the Gaussian beam. Own.
 
@@ -41,25 +37,14 @@ static TABLES: LazyLock<[[f64; ENTRIES]; SHAPES]> = LazyLock::new(|| {
     std::array::from_fn(|k| tabulate(1.0 + (WIDEST - 1.0) * k as f64 / (SHAPES - 1) as f64))
 });
 
-/// Least part of the radius up to which a beam is detected as mixed.
-const LEAST_SEEN: f64 = 0.05;
-
-/// Shape of a beam.
+/// Shape of a beam: its table.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct BeamShape {
-    positions: &'static [f64; ENTRIES],
-    has_sharp_rim: bool,
-}
+pub(super) struct BeamShape(&'static [f64; ENTRIES]);
 
 impl BeamShape {
-    /// Returns the shape with a faint rim and a number below [`SHAPES`].
+    /// Returns the shape with a number below [`SHAPES`].
     pub(super) fn numbered(number: usize) -> Self {
-        Self { positions: &TABLES[number], has_sharp_rim: false }
-    }
-
-    /// Returns the shape with a sharp rim.
-    pub(super) fn with_sharp_rim() -> Self {
-        Self { positions: &TABLES[0], has_sharp_rim: true }
+        Self(&TABLES[number])
     }
 
     /// Returns the shape of largest posterior probability, given the logarithm of the likelihood by shape: the vertex
@@ -79,17 +64,11 @@ impl BeamShape {
         Ok(Self::numbered((HALF * (1.0 + vertex.clamp(-1.0, 1.0))).round() as usize))
     }
 
-    /// Returns the distance from an edge up to which a beam is detected as mixed, in radii. A faint rim is detected up to
-    /// these log odds of the power.
-    pub(super) fn seen(self, log_odds: f64) -> f64 {
-        if self.has_sharp_rim { 1.0 } else { self.place(log_odds).0.max(LEAST_SEEN) }
-    }
-
     /// Returns the position of an edge in a beam, in radii from its middle, from the log odds of the power beyond the
     /// edge, and the derivative by these log odds.
     #[inline]
     pub(super) fn place(self, log_odds: f64) -> (f64, f64) {
-        let table = self.positions;
+        let table = self.0;
         let entry = (log_odds.abs() * PER_ODDS as f64).min((ENTRIES - 2) as f64);
         let below = (entry as u32 as usize).min(ENTRIES - 2);
         let step = table[below + 1] - table[below];

@@ -72,12 +72,8 @@ const MOST_LIMIT: f64 = 0.45;
 /// Log odds of the plate up to which it is detected before a background of unknown contrast: 1.2 % of the echo.
 const USUAL_LIMIT: f64 = 4.4;
 
-/// Largest echo of the background that counts as weak, in detection limits.
-const WEAK: f64 = 3.0;
-
-/// Least log odds of the face in the power of a beam whose echo of the background is at the detection limit: 1.1 %. With
-/// three times that, 3 %, a weak echo still comes from the rim of the beam.
-const LEAST_FAINT: f64 = 4.5;
+/// Least part of the radius up to which a beam is detected as mixed.
+const LEAST_SEEN: f64 = 0.05;
 
 /// Logarithms of the ratio of the reflectivities of each background plane and the plate.
 #[derive(Debug, Clone, Copy)]
@@ -163,7 +159,7 @@ pub(super) fn spread(sizes: Vec<f64>) -> f64 {
 /// Returns the distance outside of the edge of a plate up to which a beam is detected as mixed before a background of
 /// unknown contrast, in parts of its radius; `echo` is that of the plate there, in parts of the face's.
 pub(super) fn seen_before_unknown(shape: BeamShape, echo: f64) -> f64 {
-    shape.seen(USUAL_LIMIT + echo.max(f64::MIN_POSITIVE).ln())
+    shape.place(USUAL_LIMIT + echo.max(f64::MIN_POSITIVE).ln()).0.max(LEAST_SEEN)
 }
 
 /// Linear mixing along one lattice line before a background plane.
@@ -175,9 +171,7 @@ pub(super) struct Mixing {
     by_geometry: f64,
     /// Largest log odds of the face and of the background at which a pixel is detected as mixed.
     most_odds: [f64; 2],
-    /// Logarithm of the odds of the background in the mixed pixel nearest to the face.
-    nearest: Option<f64>,
-    /// The same where that pixel is the only one.
+    /// Logarithm of the odds of the background in a single mixed pixel.
     odds: Option<f64>,
 }
 
@@ -195,15 +189,14 @@ impl Mixing {
         let [on_face, on_plane] = [on_face, on_plane].map(|cosine| cosine.max(LEAST_COSINE));
         let limits = crossing.noise.map(|noise| detection_limit(f64::from(noise), jump).min(MOST_LIMIT));
         let is_single = |[near, far]: [Vec3; 2]| near == far && far != crossing.outside;
+        let single = crossing.mixed.filter(|pixels| is_single(pixels.ends));
         // At grazing incidence the continuation of the face recedes from cell to cell, hence the jump at the pixel.
-        let part = crossing.mixed.and_then(|pixels| Some(f64::from(pixels.excess) / f64::from(pixels.jump?)));
-        let nearest = part.filter(|part| *part > 0.0 && *part < 1.0).map(|part| (part / (1.0 - part)).ln());
+        let part = single.and_then(|pixels| Some(f64::from(pixels.excess) / f64::from(pixels.jump?)));
         Some(Self {
             plane: usize::from(plane.number),
             by_geometry: (on_plane / on_face).ln() - 2.0 * (1.0 + jump / range).ln(),
             most_odds: limits.map(|limit| ((1.0 - limit) / limit).ln()),
-            nearest,
-            odds: nearest.filter(|_| crossing.mixed.is_some_and(|pixels| is_single(pixels.ends))),
+            odds: part.filter(|part| *part > 0.0 && *part < 1.0).map(|part| (part / (1.0 - part)).ln()),
         })
     }
 
@@ -217,18 +210,7 @@ impl Mixing {
     pub(super) fn seen(&self, shape: BeamShape, contrasts: &Contrasts, echo: f64) -> [f64; 2] {
         let contrast = contrasts.0[self.plane] + self.by_geometry - echo.max(f64::MIN_POSITIVE).ln();
         let [face, background] = self.most_odds;
-        [face + contrast, background - contrast].map(|odds| shape.seen(odds))
-    }
-
-    /// Returns the part of its radius over which a beam returns a weak echo of the background, and whether that of the
-    /// mixed pixel nearest to the face is weak. `None` where a weak echo does not come from the rim of the beam.
-    pub(super) fn weak_echo(&self, shape: BeamShape, contrasts: &Contrasts) -> Option<(f64, bool)> {
-        let [limit, _] = self.most_odds;
-        let faint = limit + contrasts.0[self.plane] + self.by_geometry;
-        (faint > LEAST_FAINT).then(|| {
-            let width = shape.place(faint).0 - shape.place(faint - WEAK.ln()).0;
-            (width, self.nearest.is_some_and(|odds| (0.0..WEAK.ln()).contains(&(limit + odds))))
-        })
+        [face + contrast, background - contrast].map(|odds| shape.place(odds).0.max(LEAST_SEEN))
     }
 
     /// Returns true when a single mixed pixel determines the position of the edge.

@@ -31,7 +31,6 @@ use super::footprint;
 use super::height_field::{HeightField, LEAST_COSINE};
 use super::lattice_line::{self, BeamModel, LatticeLine};
 use super::projected_crossing::ProjectedCrossing;
-use super::sharp_rim;
 use super::side_face::SideFace;
 use super::{OutlineError, Sampling, of_each};
 use crate::Vec3;
@@ -190,8 +189,7 @@ fn slope(curve: &SplineCurve, along: f64) -> f64 {
 ///
 /// - The footprint is counted from the mixed pixels, then estimated at each edge that has enough suitable lines. The
 ///   mean of these estimates is the start value of the second fit.
-/// - The shape of the beam, the same at all edges, is that of the largest likelihood of these first fits, unless
-///   missing weak echoes show a sharp rim (`sharp_rim`).
+/// - The shape of the beam, the same at all edges, is that of the largest likelihood of these first fits.
 /// - The footprint is a property of the scanner, not of the edge. An edge with a far larger one than the others has a
 ///   strip of background beside it, whose far edge also mixes the beams. Such an edge is fitted with the footprint of
 ///   the others, and only with the mixed pixels that certainly see the plate. So is a part of an edge with mixed pixels
@@ -220,16 +218,10 @@ pub(super) fn fit_all(
         let [a, b, c, d] = of_each(|k| showing[k].then(|| fit(k)).transpose());
         Ok([a?, b?, c?, d?])
     };
-    let mut shape = BeamShape::most_likely(|shape| -> Result<f64, OutlineError> {
+    let shape = BeamShape::most_likely(|shape| -> Result<f64, OutlineError> {
         Ok(first_fits(&edges, shape)?.iter().flatten().map(|edge| edge.log_likelihood).sum())
     })?;
     let mut first = first_fits(&edges, shape)?;
-    let fitted =
-        edges.iter().zip(&first).filter_map(|(data, fit)| Some((&data.lines[..], fit.as_ref()?.beam)));
-    if sharp_rim::is_sharp(fitted) {
-        shape = BeamShape::with_sharp_rim();
-        first = first_fits(&edges, shape)?;
-    }
     let most = footprint::most_of_an_edge(first.iter().flatten().map(|fit| fit.beam.footprint));
     for (fit, data) in first.iter_mut().zip(&mut edges) {
         if fit.take_if(|fit| fit.beam.footprint > most).is_some() {

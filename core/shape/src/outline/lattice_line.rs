@@ -235,14 +235,6 @@ impl LatticeLine {
         self.mixing?.place(beam.shape, &beam.contrasts)
     }
 
-    /// Returns the expected number of mixed pixels with a weak echo of the background on this line, and whether there is
-    /// one. `None` where this says nothing about the rim of the beam.
-    pub(super) fn weak_echo(&self, beam: BeamModel) -> Option<(f64, bool)> {
-        let mixing = self.mixing.filter(|_| self.shows_footprint())?;
-        let (width, is_weak) = mixing.weak_echo(beam.shape, &beam.contrasts)?;
-        Some((width * beam.footprint * self.per_radian / self.per_step, is_weak))
-    }
-
     /// Returns true when it has a single mixed pixel that determines the position of the edge, given the contrast.
     pub(super) fn has_odds(&self) -> bool {
         self.mixing.is_some_and(|mixing| mixing.has_odds())
@@ -375,11 +367,6 @@ pub(super) mod tests {
     /// Returns the same line with one mixed pixel that determines the position of the edge.
     pub(crate) fn one_pixel_line(at: f64) -> LatticeLine {
         LatticeLine { mixing: Some(super::super::contrast::tests::half()), ..open_line(Some((at, at))) }
-    }
-
-    /// Returns the same line with the mixing of a crossing.
-    pub(crate) fn mixed_line(crossing: &crate::extract::Crossing) -> LatticeLine {
-        LatticeLine { mixing: Mixing::of(crossing), ..open_line(Some((0.0, 0.0))) }
     }
 
     /// Exact: the three shares of a beam by a sum over a fine grid, and the distance by bisection.
