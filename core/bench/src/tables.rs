@@ -137,7 +137,7 @@ fn meshes(
     for n in &arguments.meshes {
         progress::phase(&format!("flattening {n} vertices"));
         let (mesh, _) =
-            face.mesh(&one.seen.outline, &shot.spec, &shot.spec.rectangle(), *n).map_err(|e| failed(&e))?;
+            face.mesh(&one.seen.outline, &shot.spec, &shot.blank, *n).map_err(|e| failed(&e))?;
         let repeat = if *n > LARGE_MESH { arguments.repeat.min(3) } else { arguments.repeat };
         let times = flattenings.iter_mut().map(|flattening| time(flattening, &mesh, repeat)).collect();
         rows.push((mesh.vertices.len(), times));

@@ -109,8 +109,8 @@ impl CurveFit {
         Self { knots, matrix, right: DVector::zeros(n) }
     }
 
-    /// Adds an unknown amplitude times `profile` to the curvature of the prior. The amplitude is given by its mean and
-    /// standard deviation.
+    /// Adds an unknown amplitude times `profile` to the curvature of the prior, before any data are added. The amplitude is
+    /// given by its mean and standard deviation.
     #[must_use]
     pub fn with_curvature(mut self, profile: impl Fn(f64) -> f64, [mean, amplitude]: [f64; 2]) -> Self {
         let step = self.knots.step();

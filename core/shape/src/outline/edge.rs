@@ -3,8 +3,8 @@
 //! In: the projected crossings of one edge. Out: the edge as a spline curve, and its posterior.
 //!
 //! - The likelihood of the curve is the product of the interval-censored likelihoods of its lattice lines
-//!   (`edge_likelihood`). The prior is the curvature that the membrane strain of the plate gives its edges, and
-//!   white noise about it.
+//!   (`edge_likelihood`). The prior is Gaussian: the curvature that the membrane strain of the plate gives its edges, the
+//!   camber of the cut, and white noise.
 //! - The estimate is unbiased; the middle between two samples is not. Along a lattice row all lines have the same
 //!   interval except at the few cells where the edge changes rows, and these cells locate it. Where the edge changes no
 //!   row or column the posterior is sampled (`edge_posterior`).
