@@ -136,8 +136,7 @@ fn meshes(
     let mut rows = Vec::new();
     for n in &arguments.meshes {
         progress::phase(&format!("flattening {n} vertices"));
-        let (mesh, _) =
-            face.mesh(&one.seen.outline, &shot.spec, &shot.blank, *n).map_err(|e| failed(&e))?;
+        let (mesh, _) = face.mesh(&one.seen.outline, &shot.spec, &shot.blank, *n).map_err(|e| failed(&e))?;
         let repeat = if *n > LARGE_MESH { arguments.repeat.min(3) } else { arguments.repeat };
         let times = flattenings.iter_mut().map(|flattening| time(flattening, &mesh, repeat)).collect();
         rows.push((mesh.vertices.len(), times));
