@@ -162,39 +162,50 @@ impl Plan {
         if stored.iter().min()? < &self.first_row || stored.iter().max()? > &last {
             return None;
         }
-        let row = |stored: u32| if self.rows_flipped { last - stored } else { stored - self.first_row };
-        let state: Vec<State> = some.clone().map(|cell| cells.true_state(cell)).collect();
-        let known = || (0..state.len()).filter(|cell| state[*cell] != State::NoReturn);
-        let rows = || known().map(|cell| row(stored[cell]));
-        let first_row = rows().min().unwrap_or(0);
-        let n = rows().max().map_or(0, |last| last + 1 - first_row) as usize;
+        // Cell of each row, counted from the first cell.
+        let mut cell_of_row = vec![NO_CELL; self.header.n_rows as usize];
+        for (stored, cell) in stored.iter().zip(0..) {
+            let row = if self.rows_flipped { last - stored } else { stored - self.first_row };
+            if cells.true_state(some.start + cell as usize) != State::NoReturn {
+                cell_of_row[row as usize] = cell;
+            }
+        }
+        let known = |cell: &u32| *cell != NO_CELL;
+        let first_row = cell_of_row.iter().position(known).unwrap_or(0);
+        let end = cell_of_row.iter().rposition(known).map_or(first_row, |last| last + 1);
+        let cell_of_row = &cell_of_row[first_row..end];
         let face = match self.header.seam_column {
             Some(seam) if index >= seam => Face::Back,
             _ => Face::Front,
         };
-        let mut column = Column {
+        let millimetres = self.unit == Unit::Millimetre;
+        let metres = |range: f64| if millimetres { range / 1000.0 } else { range };
+        let (ranges, azimuths) = (&cells.range[some.clone()], &cells.azimuth[some.clone()]);
+        let azimuth = match self.mirror {
+            Mirror::None => gathered(cell_of_row, azimuths, |azimuth| azimuth),
+            Mirror::X => gathered(cell_of_row, azimuths, |azimuth| wrap_azimuth(PI - azimuth)),
+            Mirror::Y => gathered(cell_of_row, azimuths, |azimuth| wrap_azimuth(-azimuth)),
+        };
+        Some(Column {
             index,
             face,
-            first_row,
-            range_m: vec![0.0; n],
-            azimuth: vec![0.0; n],
-            elevation: vec![0.0; n],
-            intensity: vec![0; n],
-            state: vec![State::NoReturn; n],
-        };
-        for cell in known() {
-            let (i, from) = ((row(stored[cell]) - first_row) as usize, some.start + cell);
-            let (range, azimuth) = (cells.range[from], cells.azimuth[from]);
-            column.range_m[i] = if self.unit == Unit::Millimetre { range / 1000.0 } else { range };
-            column.azimuth[i] = match self.mirror {
-                Mirror::None => azimuth,
-                Mirror::X => wrap_azimuth(PI - azimuth),
-                Mirror::Y => wrap_azimuth(-azimuth),
-            };
-            column.elevation[i] = cells.elevation[from];
-            column.intensity[i] = self.intensity.apply(cells.intensity[from]);
-            column.state[i] = state[cell];
-        }
-        Some(column)
+            first_row: first_row as u32,
+            range_m: gathered(cell_of_row, ranges, metres),
+            azimuth,
+            elevation: gathered(cell_of_row, &cells.elevation[some.clone()], |elevation| elevation),
+            intensity: gathered(cell_of_row, &cells.intensity[some.clone()], |value| {
+                self.intensity.apply(value)
+            }),
+            state: gathered(cell_of_row, &cells.state[some], |state| state),
+        })
     }
+}
+
+/// Mark of a row without a cell whose direction is known.
+const NO_CELL: u32 = u32::MAX;
+
+/// Returns the values of the rows' cells; the default where a row has none.
+fn gathered<T: Copy, U: Default>(cell_of_row: &[u32], values: &[T], convert: impl Fn(T) -> U) -> Vec<U> {
+    let value = |cell: &u32| values.get(*cell as usize).map_or_else(U::default, |value| convert(*value));
+    cell_of_row.iter().map(value).collect()
 }

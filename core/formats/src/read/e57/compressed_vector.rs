@@ -102,13 +102,13 @@ impl Points {
     /// Reads a field of all points as numbers.
     pub(super) fn numbers(&self, field: usize, into: &mut Vec<f64>) {
         let stream = &self.streams[field];
-        stream.encoding.numbers(&stream.values(self.n), into);
+        stream.encoding.numbers(stream.values(self.n), into);
     }
 
     /// Reads a field of all points as whole numbers; PDAL writes states as floats.
     pub(super) fn wholes(&self, field: usize, into: &mut Vec<i64>) {
         let stream = &self.streams[field];
-        stream.encoding.wholes(&stream.values(self.n), into);
+        stream.encoding.wholes(stream.values(self.n), into);
     }
 
     /// Builds one packet of bytestreams of these types.
@@ -179,33 +179,29 @@ impl Stream {
         (8 * self.bytes.len() - self.bit).checked_div(self.width)
     }
 
-    /// Unpacks the first `n` values, which must be complete.
-    fn values(&self, n: usize) -> Vec<u64> {
+    /// Returns the first `n` values, which must be complete.
+    fn values(&self, n: usize) -> impl Iterator<Item = u64> {
         let Self { width, bit: start, ref bytes, .. } = *self;
-        if width == 0 {
-            return vec![0; n];
-        }
-        let mask = u64::MAX >> (64 - width);
-        // A value of up to 64 bits lies in nine bytes.
-        let at = |bit: usize| {
+        let mask = u64::MAX.checked_shr(64 - width as u32).unwrap_or(0);
+        // Where eight bytes suffice, all but the last few values are read eight bytes at a time.
+        let in_eight = width <= 57 || width.is_multiple_of(8) && start.is_multiple_of(8);
+        let last = (8 * bytes.len()).saturating_sub(start + 64);
+        let fast = if in_eight { n.min(last.checked_div(width).unwrap_or(0)) } else { 0 };
+        let fast_values = (0..fast).map(move |k| {
+            let bit = start + k * width;
+            let eight = bytes[bit / 8..].first_chunk().map_or(0, |eight| u64::from_le_bytes(*eight));
+            eight >> (bit % 8) & mask
+        });
+        let rest = (fast..n).map(move |k| {
+            let bit = start + k * width;
+            // A value of up to 64 bits lies in nine bytes.
             let mut nine = [0; 16];
             let from = &bytes[bit / 8..];
             let held = from.len().min(9);
             nine[..held].copy_from_slice(&from[..held]);
             (u128::from_le_bytes(nine) >> (bit % 8)) as u64 & mask
-        };
-        // Where eight bytes suffice, all but the last few values are read eight bytes at a time.
-        let in_eight = width <= 57 || width.is_multiple_of(8) && start.is_multiple_of(8);
-        let last = (8 * bytes.len()).saturating_sub(start + 64);
-        let fast = if in_eight { n.min(last / width) } else { 0 };
-        let mut values = Vec::with_capacity(n);
-        values.extend((0..fast).map(|k| {
-            let bit = start + k * width;
-            let eight = bytes[bit / 8..].first_chunk().map_or(0, |eight| u64::from_le_bytes(*eight));
-            eight >> (bit % 8) & mask
-        }));
-        values.extend((fast..n).map(|k| at(start + k * width)));
-        values
+        });
+        fast_values.chain(rest)
     }
 }
 
@@ -244,29 +240,27 @@ impl Encoding {
     }
 
     /// Replaces `numbers` by the decoded values.
-    fn numbers(self, values: &[u64], numbers: &mut Vec<f64>) {
+    fn numbers(self, values: impl Iterator<Item = u64>, numbers: &mut Vec<f64>) {
         numbers.clear();
         // The encoding is distinguished once, not for every value; for speed only: `tests::speed`.
         match self {
-            Self::Single => {
-                numbers.extend(values.iter().map(|value| f64::from(f32::from_bits(*value as u32))))
-            }
-            Self::Double => numbers.extend(values.iter().map(|value| f64::from_bits(*value))),
+            Self::Single => numbers.extend(values.map(|value| f64::from(f32::from_bits(value as u32)))),
+            Self::Double => numbers.extend(values.map(f64::from_bits)),
             Self::Integer { min } => {
-                numbers.extend(values.iter().map(|value| min.wrapping_add_unsigned(*value) as f64));
+                numbers.extend(values.map(|value| min.wrapping_add_unsigned(value) as f64));
             }
             Self::Scaled { min, scale, offset } => {
-                let whole = values.iter().map(|value| min.wrapping_add_unsigned(*value) as f64);
+                let whole = values.map(|value| min.wrapping_add_unsigned(value) as f64);
                 numbers.extend(whole.map(|whole| whole * scale + offset));
             }
         }
     }
 
     /// Replaces `wholes` by the decoded values, with the fraction cut off.
-    fn wholes(self, values: &[u64], wholes: &mut Vec<i64>) {
+    fn wholes(self, values: impl Iterator<Item = u64>, wholes: &mut Vec<i64>) {
         wholes.clear();
         if let Self::Integer { min } = self {
-            wholes.extend(values.iter().map(|value| min.wrapping_add_unsigned(*value)));
+            wholes.extend(values.map(|value| min.wrapping_add_unsigned(value)));
         } else {
             let mut numbers = Vec::new();
             self.numbers(values, &mut numbers);
@@ -364,8 +358,8 @@ mod tests {
     fn values_are_those_of_their_types() {
         let (mut numbers, mut wholes) = (Vec::new(), Vec::new());
         let mut of = |encoding: Encoding, value: u64| {
-            encoding.numbers(&[value], &mut numbers);
-            encoding.wholes(&[value], &mut wholes);
+            encoding.numbers([value].into_iter(), &mut numbers);
+            encoding.wholes([value].into_iter(), &mut wholes);
             (numbers[0], wholes[0])
         };
         assert_eq!(of(Encoding::Scaled { min: -3, scale: 0.5, offset: 10.2 }, 1), (9.2, 9));
