@@ -12,8 +12,9 @@ const PATCH: f64 = 0.12;
 /// 0.1 mm at a curvature of 1/m.
 const MARGIN: f64 = 1e-3;
 
-/// Convergence limit: distance of the surface point from the ray, metres.
-const CLOSE: f64 = 1e-11;
+/// Convergence limit: distance of the surface point from the ray before the last step, metres. Afterwards it is below
+/// 1e-17 m; the normal is that before the step.
+const CLOSE: f64 = 1e-9;
 
 /// Overlap of faces and patches, metres, so that no ray passes between them.
 const OVERLAP: f64 = 1e-9;
@@ -208,11 +209,8 @@ impl Patch {
                 return None;
             }
             let range = normal.dot(&(point - ray.origin)) / slope;
-            let residual = ray.at(range) - point;
-            if residual.norm_squared() < CLOSE * CLOSE {
-                return Some(Root { range, at, normal });
-            }
             // The residual lies in the tangent plane: resolve it along da and db.
+            let residual = ray.at(range) - point;
             let area = normal.norm_squared();
             let steps = [residual.cross(&db).dot(&normal) / area, da.cross(&residual).dot(&normal) / area];
             let next = [a + steps[0], b + steps[1]];
@@ -222,7 +220,8 @@ impl Patch {
                 return None;
             }
             // The rest of the way is no longer than this step, even to a double root; twice that is allowed.
-            if !is_within(2.0 * steps[0].abs().max(steps[1].abs())) {
+            let is_elsewhere = !is_within(2.0 * steps[0].abs().max(steps[1].abs()));
+            if is_elsewhere || residual.norm_squared() < CLOSE * CLOSE {
                 return Some(Root { range, at: FacePoint { parameters: next, ..at }, normal });
             }
             at = self.face.at(plate, next);

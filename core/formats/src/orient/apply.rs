@@ -162,17 +162,16 @@ impl Plan {
         if stored.iter().min()? < &self.first_row || stored.iter().max()? > &last {
             return None;
         }
-        // Cell of each row, counted from the first cell.
-        let mut cell_of_row = vec![NO_CELL; self.header.n_rows as usize];
+        // Cell of known direction of each row, counted from the first cell.
+        let mut cell_of_row = vec![None; self.header.n_rows as usize];
         for (stored, cell) in stored.iter().zip(0..) {
             let row = if self.rows_flipped { last - stored } else { stored - self.first_row };
             if cells.true_state(some.start + cell as usize) != State::NoReturn {
-                cell_of_row[row as usize] = cell;
+                cell_of_row[row as usize] = Some(cell);
             }
         }
-        let known = |cell: &u32| *cell != NO_CELL;
-        let first_row = cell_of_row.iter().position(known).unwrap_or(0);
-        let end = cell_of_row.iter().rposition(known).map_or(first_row, |last| last + 1);
+        let first_row = cell_of_row.iter().position(Option::is_some).unwrap_or(0);
+        let end = cell_of_row.iter().rposition(Option::is_some).map_or(first_row, |last| last + 1);
         let cell_of_row = &cell_of_row[first_row..end];
         let face = match self.header.seam_column {
             Some(seam) if index >= seam => Face::Back,
@@ -201,11 +200,12 @@ impl Plan {
     }
 }
 
-/// Mark of a row without a cell whose direction is known.
-const NO_CELL: u32 = u32::MAX;
-
 /// Returns the values of the rows' cells; the default where a row has none.
-fn gathered<T: Copy, U: Default>(cell_of_row: &[u32], values: &[T], convert: impl Fn(T) -> U) -> Vec<U> {
-    let value = |cell: &u32| values.get(*cell as usize).map_or_else(U::default, |value| convert(*value));
+fn gathered<T: Copy, U: Default>(
+    cell_of_row: &[Option<u32>],
+    values: &[T],
+    convert: impl Fn(T) -> U,
+) -> Vec<U> {
+    let value = |cell: &Option<u32>| cell.map_or_else(U::default, |cell| convert(values[cell as usize]));
     cell_of_row.iter().map(value).collect()
 }
