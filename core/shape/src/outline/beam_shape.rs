@@ -5,6 +5,10 @@
 //! positions are in parts of the radius at which the beam ends, the footprint, so that the shape changes nothing but
 //! the law between power and position.
 //!
+//! A beam of a few rays, as simulators have it, mixes in steps. Its positions scatter more than those of a smooth beam,
+//! by which it is recognised (`edge`), and it has no faint rim: it is detected as mixed wherever one ray sees the other
+//! side. Taken for a smooth beam it moves an edge by up to a tenth of its radius.
+//!
 //! In: log odds of the power beyond an edge. Out: the position of the edge, and its derivative. The integral over the
 //! beam is tabulated, within 0.002 of the radius. Siegman, "Lasers" (1986), section 17.1, for the Gaussian beam. Own.
 
@@ -37,14 +41,25 @@ static TABLES: LazyLock<[[f64; ENTRIES]; SHAPES]> = LazyLock::new(|| {
     std::array::from_fn(|k| tabulate(1.0 + (WIDEST - 1.0) * k as f64 / (SHAPES - 1) as f64))
 });
 
-/// Shape of a beam: its table.
+/// Least part of the radius up to which a beam is detected as mixed.
+const LEAST_SEEN: f64 = 0.05;
+
+/// Shape of a beam.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct BeamShape(&'static [f64; ENTRIES]);
+pub(super) struct BeamShape {
+    positions: &'static [f64; ENTRIES],
+    is_of_few_rays: bool,
+}
 
 impl BeamShape {
-    /// Returns the shape with a number below [`SHAPES`].
+    /// Returns the shape of a smooth beam with a number below [`SHAPES`].
     pub(super) fn numbered(number: usize) -> Self {
-        Self(&TABLES[number])
+        Self { positions: &TABLES[number], is_of_few_rays: false }
+    }
+
+    /// Returns the shape of a beam of a few rays, whose mixing goes in steps about that of the narrowest smooth beam.
+    pub(super) fn of_few_rays() -> Self {
+        Self { positions: &TABLES[0], is_of_few_rays: true }
     }
 
     /// Returns the shape of largest posterior probability, given the logarithm of the likelihood by shape: the vertex
@@ -64,11 +79,17 @@ impl BeamShape {
         Ok(Self::numbered((HALF * (1.0 + vertex.clamp(-1.0, 1.0))).round() as usize))
     }
 
+    /// Returns the distance from an edge up to which a beam is detected as mixed, in radii; that of a smooth beam is where
+    /// the power beyond the edge has these log odds. A few rays have no faint rim: one of them is enough.
+    pub(super) fn seen(self, log_odds: f64) -> f64 {
+        if self.is_of_few_rays { 1.0 } else { self.place(log_odds).0.max(LEAST_SEEN) }
+    }
+
     /// Returns the position of an edge in a beam, in radii from its middle, from the log odds of the power beyond the
     /// edge, and the derivative by these log odds.
     #[inline]
     pub(super) fn place(self, log_odds: f64) -> (f64, f64) {
-        let table = self.0;
+        let table = self.positions;
         let entry = (log_odds.abs() * PER_ODDS as f64).min((ENTRIES - 2) as f64);
         let below = (entry as u32 as usize).min(ENTRIES - 2);
         let step = table[below + 1] - table[below];
@@ -132,6 +153,15 @@ pub(super) mod tests {
                 assert!((BeamShape::numbered(shape).place(-log_odds).0 + place).abs() < 1e-12);
             }
         }
+    }
+
+    #[test]
+    fn a_smooth_beam_is_detected_by_its_power_and_one_of_few_rays_up_to_its_rim() {
+        let (smooth, stepped) = (BeamShape::numbered(0), BeamShape::of_few_rays());
+        assert!(smooth.seen(2.0) < smooth.seen(5.0) && smooth.seen(5.0) < 1.0);
+        assert_eq!(smooth.seen(0.0), LEAST_SEEN);
+        assert_eq!([0.0, 2.0, 5.0].map(|odds| stepped.seen(odds)), [1.0; 3]);
+        assert_eq!(stepped.place(2.0), smooth.place(2.0));
     }
 
     #[test]

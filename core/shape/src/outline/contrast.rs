@@ -72,9 +72,6 @@ const MOST_LIMIT: f64 = 0.45;
 /// Log odds of the plate up to which it is detected before a background of unknown contrast: 1.2 % of the echo.
 const USUAL_LIMIT: f64 = 4.4;
 
-/// Least part of the radius up to which a beam is detected as mixed.
-const LEAST_SEEN: f64 = 0.05;
-
 /// Logarithms of the ratio of the reflectivities of each background plane and the plate.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Contrasts([f64; BACKGROUND_PLANES]);
@@ -159,7 +156,7 @@ pub(super) fn spread(sizes: Vec<f64>) -> f64 {
 /// Returns the distance outside of the edge of a plate up to which a beam is detected as mixed before a background of
 /// unknown contrast, in parts of its radius; `echo` is that of the plate there, in parts of the face's.
 pub(super) fn seen_before_unknown(shape: BeamShape, echo: f64) -> f64 {
-    shape.place(USUAL_LIMIT + echo.max(f64::MIN_POSITIVE).ln()).0.max(LEAST_SEEN)
+    shape.seen(USUAL_LIMIT + echo.max(f64::MIN_POSITIVE).ln())
 }
 
 /// Linear mixing along one lattice line before a background plane.
@@ -210,7 +207,7 @@ impl Mixing {
     pub(super) fn seen(&self, shape: BeamShape, contrasts: &Contrasts, echo: f64) -> [f64; 2] {
         let contrast = contrasts.0[self.plane] + self.by_geometry - echo.max(f64::MIN_POSITIVE).ln();
         let [face, background] = self.most_odds;
-        [face + contrast, background - contrast].map(|odds| shape.place(odds).0.max(LEAST_SEEN))
+        [face + contrast, background - contrast].map(|odds| shape.seen(odds))
     }
 
     /// Returns true when a single mixed pixel determines the position of the edge.

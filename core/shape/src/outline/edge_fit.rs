@@ -57,7 +57,7 @@ impl EdgeFit {
         for _ in 0..ROUNDS {
             let last = beam;
             beam.contrasts = found.contrasts;
-            beam.mixed_spread = mixed_spread(&lines, &found);
+            beam.mixed_spread = contrast::spread(mixed_offsets(&lines, &found));
             if own && footprint > 0.0 {
                 let at = |along| found.curve.at(along);
                 (beam.footprint, log_likelihood) = footprint::at_edge(lattice_lines, at, footprint, beam);
@@ -73,6 +73,12 @@ impl EdgeFit {
         let contrasts =
             ContrastDistribution::of(&found.contrasts, |plane| covariance[(n + plane, n + plane)].sqrt());
         Some(Self { lines, found, covariance, contrasts, beam, log_likelihood })
+    }
+
+    /// Returns the absolute distances of the edge positions by the single mixed pixels from the curve, in radii of the
+    /// beam.
+    pub(super) fn mixed_offsets(&self) -> Vec<f64> {
+        mixed_offsets(&self.lines, &self.found)
     }
 
     /// Returns, for each line, the derivatives of the curve at `places` along it by the position of the edge in the line.
@@ -130,14 +136,15 @@ fn most_likely(prior: &CurveFit, lines: &[EdgeLikelihood], step: f64) -> Option<
     Some(found)
 }
 
-/// Estimates the scatter of the edge positions by the single mixed pixels about the curve, in radii of the beam.
-fn mixed_spread(lines: &[EdgeLikelihood], found: &MostLikely) -> f64 {
+/// Returns the absolute distances of the edge positions by the single mixed pixels from the curve, in radii of the
+/// beam.
+fn mixed_offsets(lines: &[EdgeLikelihood], found: &MostLikely) -> Vec<f64> {
     let size = |line: &EdgeLikelihood| {
         let shared = line.shared?;
         let off = shared.off(found.curve.at(line.along), found.contrasts.logarithms());
         Some((off / shared.radius).abs())
     };
-    contrast::spread(lines.iter().filter_map(size).collect())
+    lines.iter().filter_map(size).collect()
 }
 
 /// Performs one Newton step of the curve and the contrasts.

@@ -10,6 +10,8 @@
 //! The footprint is a property of the scanner. An edge with a far larger one than the others has a strip of background
 //! beside it. Own.
 
+use std::ops::Range;
+
 use platen_numerics::normal_distribution::cdf;
 
 use super::edge_likelihood::{HIDDEN_PART, OUTLIER_PART};
@@ -27,7 +29,7 @@ const NORMAL_DENSITY: f64 = 0.398_942_28;
 /// Number of lines that determine the number of mixed pixels per line to a tenth.
 const LEAST_LINES: usize = 100;
 
-/// Largest footprint of an edge relative to the median of the edges. On 32 plates edges without a strip have 0.93 to
+/// Largest footprint of an edge relative to the median of the edges, and the reciprocal of the least. On 32 plates edges without a strip have 0.93 to
 /// 1.1 of the median, edges beside strips 1.1 to 2.5.
 const MOST_OF_OTHERS: f64 = 1.4;
 
@@ -44,9 +46,10 @@ pub(super) fn counted(edges: &[&[LatticeLine]], angle: f64) -> f64 {
     lower_median(each).unwrap_or_else(|| by_number(edges.iter().copied().flatten(), angle))
 }
 
-/// Returns the largest footprint that an edge may have, given those found at all edges.
-pub(super) fn most_of_an_edge(found: impl Iterator<Item = f64>) -> f64 {
-    lower_median(found).map_or(0.0, |median| median * MOST_OF_OTHERS)
+/// Returns the footprints that an edge may have, given those found at all edges.
+pub(super) fn usual(found: impl Iterator<Item = f64>) -> Range<f64> {
+    let median = lower_median(found).unwrap_or(0.0);
+    median / MOST_OF_OTHERS..median * MOST_OF_OTHERS
 }
 
 /// Returns the lower median (of two values the lesser): cells wrongly taken for mixed pixels can only widen a
@@ -161,6 +164,6 @@ mod tests {
         assert_eq!(of(&[&narrow, &wide]), alone);
         assert_eq!(of(&[&wide, &narrow, &narrow]), alone);
         let found = [1.0, 1.1, 4.0].map(|times| times * alone);
-        assert!((found[1]..found[2]).contains(&most_of_an_edge(found.into_iter())));
+        assert!((found[1]..found[2]).contains(&usual(found.into_iter()).end));
     }
 }
