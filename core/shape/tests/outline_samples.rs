@@ -17,7 +17,7 @@ fn corners_are_where_the_truth_has_them() {
         let off = |k: usize| (outline.corners[k].point - support::vec3(&sample.truth["corners_m"][k])).norm();
         let rms_mm = ((0..4).map(|k| off(k).powi(2)).sum::<f64>() / 4.0).sqrt() * 1000.0;
         println!("{}: corners {rms_mm:.2} mm rms", folder.display());
-        // Found: 0.21 to 0.41 mm, at a lattice step of 8 mm.
+        // Found: 0.09 to 0.43 mm, at a lattice step of 8 mm.
         assert!(rms_mm < 0.82, "{rms_mm}");
         for k in 0..4 {
             let truth = |k: usize| support::vec3(&sample.truth["corners_m"][k % 4]);
@@ -36,7 +36,7 @@ fn corners_are_where_the_truth_has_them() {
         let scatter = (ratios.iter().map(|x| x * x).sum::<f64>() / n).sqrt();
         println!("errors over stated deviations: mean {:.2}, rms {scatter:.2}", sum / n);
         // The errors scatter as stated, and no part of them is common to all edges.
-        assert!((0.6..1.6).contains(&scatter) && (sum / n).abs() < 0.5);
+        assert!((0.6..1.6).contains(&scatter) && (sum / n).abs() < 0.44);
     }
 }
 

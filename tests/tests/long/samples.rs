@@ -2,7 +2,7 @@
 //! the samples.
 //!
 //! A sample is one random draw of the noise and of the position of the lattice on the edges. It is therefore compared
-//! with the range of many draws: its figures must lie within that range, widened by [`FACTOR`] on both sides.
+//! with the range of many draws: its figures must lie within that range, widened by [`TOLERANCE_MM`] on both sides.
 //!
 //! Beams and brightness must be those of the samples, since they bias the edges: a beam of a few rays before a floor
 //! darker than the plate moves an edge by up to a tenth of the beam's radius. Both were read from the mixed pixels of
@@ -27,8 +27,9 @@ use serde_json::Value as Json;
 
 type Vec3 = Vector3<f64>;
 
-/// Factor by which the range of our draws is widened: no sample is outside of the range itself.
-const FACTOR: f64 = 1.15;
+/// Length by which the range of our draws is widened: 0.034 mm is found on the sphere, whose right edge is 0.27 mm too
+/// far out in the sample. Both beams have 13 rays; that of the samples need not have the same weights.
+const TOLERANCE_MM: f64 = 0.04;
 /// Scans of each scene by our simulator.
 const SEEDS: u64 = 10;
 /// Largest shift of the plate from seed to seed, millimetres: more than a lattice step.
@@ -182,7 +183,7 @@ fn check(name: &str, shape: &'static str) {
                 theirs[k]
             );
             assert!(
-                (least / FACTOR..=most * FACTOR).contains(&theirs[k]),
+                (least - TOLERANCE_MM..=most + TOLERANCE_MM).contains(&theirs[k]),
                 "{name}: {what} of the sample {} mm, ours {least} to {most} mm",
                 theirs[k]
             );
