@@ -34,10 +34,25 @@ fn check(arguments: &[&str], bounds: Bounds, ratio: f64) {
     }
 }
 
+/// On mill scale. Found: 0.39 and 1.4, 0.30 and 1.0, 0.55 and 1.4, 0.60 and 1.8 mm, 0.026 and 0.093, 0.008 and 0.013
+/// degrees; the largest on a plate seen at spacings of 43 mm.
+#[test]
+fn stated_intervals_contain_the_errors_of_random_scenes() {
+    let bounds = [
+        ("corner, u or v, mm", [0.8, 2.1]),
+        ("marker, u or v, mm", [0.6, 1.5]),
+        ("edge, mm", [1.1, 2.1]),
+        ("diagonal, mm", [1.2, 2.4]),
+        ("angle, degrees", [0.053, 0.14]),
+        ("twist, degrees", [0.017, 0.02]),
+    ];
+    check(&["square", "--reflectivity", "0.35"], bounds, RATIO);
+}
+
 /// About twice the found values: 0.39 and 1.9, 0.31 and 1.5, 0.56 and 2.0, 0.69 and 2.3 mm, 0.027 and 0.11, 0.009 and
 /// 0.014 degrees. Without the contrast 92 % of the diagonals of 200 scenes are in their intervals.
 #[test]
-fn stated_intervals_contain_the_errors_of_random_scenes() {
+fn stated_intervals_contain_the_errors_of_dark_and_bright_plates() {
     let bounds = [
         ("corner, u or v, mm", [0.8, 2.9]),
         ("marker, u or v, mm", [0.6, 2.2]),
