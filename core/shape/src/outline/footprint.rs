@@ -8,7 +8,7 @@
 //!    position of the edge in each of them by its range (`contrast`).
 //!
 //! The footprint is a property of the scanner. An edge with a far larger one than the others has a strip of background
-//! beside it. Own.
+//! beside it; at one with a far smaller one it was not found, and that of the others is used. Own.
 
 use std::ops::Range;
 
