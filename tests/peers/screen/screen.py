@@ -635,6 +635,7 @@ def check_a_week_needs_no_reload(browser):
             const Own = EventSource;
             window.EventSource = class extends Own { constructor(...a) { super(...a); window.stream = this; this.addEventListener('state', e => { window.last ??= e.data; }); } };"""})
         opened(browser, host)
+        wait("a state", lambda: browser.execute_script("return window.last !== undefined"), 10)
         feed = """
             const states = [window.last, window.last.replaceAll('"class":"band more"', '"class":"band unknown"').replace(/"text":"[^"]*"/g, '"text":"changed"')];
             for (let k = 0; k < arguments[0]; k++) window.stream.dispatchEvent(new MessageEvent('state', {data: states[k % 2]}));"""
