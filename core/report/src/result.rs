@@ -36,7 +36,7 @@ use platen_model::{Figure, Report, Task, Verdict};
 use platen_plant::PlateFile;
 use platen_shape::evaluate::{self, Place};
 use platen_shape::{
-    Blank, EXPANDED, EdgeDoubt, Measured, RangeError, Scanned, ShapeChecks, Vec3, corners_seen, edge_doubts,
+    Blank, CUT_ERROR, Corner, EXPANDED, EdgeDoubt, Measured, RangeError, Scanned, ShapeChecks, Vec3, corners_seen, edge_doubts,
 };
 
 /// Version of the document.
@@ -77,8 +77,8 @@ pub struct ResultRecord {
     /// Expanded uncertainty (95 %) of each corner, all directions together; null in documents older than it.
     #[serde(default)]
     pub corners_uncertainty_mm: Option<[f64; 4]>,
-    /// Whether each corner was seen; false where it was extrapolated, or where the length of an adjacent edge differs
-    /// from the length that was cut.
+    /// Whether each corner was seen; false where it was extrapolated, where its uncertainty along an edge exceeds 2 mm,
+    /// or where the length of an adjacent edge differs from the length that was cut.
     pub corners_seen: [bool; 4],
     /// Markers.
     pub markers: Vec<MarkerRecord>,
@@ -254,6 +254,7 @@ impl ResultRecord {
             says: sentences(context.reports)
                 .into_iter()
                 .chain(doubts.iter().map(doubt_sentence))
+                .chain(outline.corners.iter().zip(checks::CORNERS).filter_map(corner_sentence))
                 .chain(bevel_sentence(context.plate.plate.face_inset))
                 .chain(context.assumption.map(str::to_owned))
                 .collect(),
@@ -364,6 +365,17 @@ fn doubt_sentence(doubt: &EdgeDoubt) -> String {
         mm(length),
         mm(EXPANDED * sigma),
     )
+}
+
+/// Returns the sentence on a corner that counts as not seen because its uncertainty exceeds the error of a cut.
+fn corner_sentence((corner, name): (&Corner, &str)) -> Option<String> {
+    (corner.seen && corner.uncertainty() > CUT_ERROR).then(|| {
+        format!(
+            "the corner {name} is located to +- {:.1} mm only: the samples of its edges lie too far apart; scan with \
+             smaller steps, or from a place that sees its edges less obliquely",
+            mm(corner.uncertainty())
+        )
+    })
 }
 
 /// Returns the expanded uncertainties of the corners: along their edges from the outline, along the normal from the

@@ -8,4 +8,4 @@ pub mod marker_detection;
 
 pub use bending_energy::BendingEnergy;
 pub use dimension_checks::{Check, EdgeCheck, ShapeChecks};
-pub use edge_doubt::{EdgeDoubt, corners_seen, edge_doubts};
+pub use edge_doubt::{CUT_ERROR, EdgeDoubt, corners_seen, edge_doubts};

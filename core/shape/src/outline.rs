@@ -60,7 +60,7 @@ pub(crate) use height_field::{SPAN, biweight, per_sigma_across, thinned};
 use platen_numerics::join::join;
 
 use crate::extract::Patch;
-use crate::{PlateSpec, Vec3};
+use crate::{EXPANDED, PlateSpec, Vec3};
 use edge::{Edge, EdgeData};
 use plane::Plane;
 use projected_crossing::ProjectedCrossing;
@@ -79,6 +79,14 @@ pub struct Corner {
     pub contrast: [f64; 2],
     /// False when the corner's neighbourhood was hidden and its place was extrapolated from its edges.
     pub seen: bool,
+}
+
+impl Corner {
+    /// Returns the larger of the expanded uncertainties (95 %) along its two edges, metres.
+    #[must_use]
+    pub fn uncertainty(&self) -> f64 {
+        EXPANDED * self.sigma[0].max(self.sigma[1])
+    }
 }
 
 /// One edge of the scanned face from its first to its last corner.

@@ -31,6 +31,10 @@ fn made(folder: &Path, kind: &str, language: &str) -> PathBuf {
         cargo.args(["build", "--release", "--quiet"]).env("CARGO_TARGET_DIR", &target);
         // Libraries that the workspace has with the same features are not built again.
         cargo.env("CARGO_BUILD_BUILD_DIR", built.parent().unwrap());
+        if kind != "scanner" {
+            // Most of the others' libraries are built, and used for seconds.
+            cargo.env("CARGO_PROFILE_RELEASE_OPT_LEVEL", "1");
+        }
         (cargo, target.join("release").join(&file))
     } else {
         (Command::new("make"), place.join(&file))

@@ -42,7 +42,8 @@ pub struct CheckRecord {
     pub seen: bool,
 }
 
-/// Names of the edges, in their order.
+/// Names of the corners and of the edges, in their order.
+pub(super) const CORNERS: [&str; 4] = ["(0, 0)", "(W, 0)", "(W, H)", "(0, H)"];
 pub(super) const EDGES: [&str; 4] = ["edge v = 0", "edge u = W", "edge v = H", "edge u = 0"];
 
 impl ShapeChecksRecord {
@@ -63,7 +64,6 @@ impl ShapeChecksRecord {
 
     /// Returns name, figure and unit of every check, in a fixed order.
     pub fn rows(&self) -> Vec<(String, CheckRecord, &'static str)> {
-        let corners = ["(0, 0)", "(W, 0)", "(W, H)", "(0, H)"];
         let mut rows = Vec::new();
         for (k, how) in ["along the mid-surface", "tape on the face", "straight"].into_iter().enumerate() {
             for (name, edge) in EDGES.iter().zip(&self.edges) {
@@ -74,7 +74,7 @@ impl ShapeChecksRecord {
         rows.push(("diagonal (0, 0) to (W, H)".into(), self.diagonals_mm[0], "mm"));
         rows.push(("diagonal (W, 0) to (0, H)".into(), self.diagonals_mm[1], "mm"));
         rows.push(("difference of the diagonals".into(), self.diagonal_difference_mm, "mm"));
-        for (name, angle) in corners.iter().zip(&self.angles_deg) {
+        for (name, angle) in CORNERS.iter().zip(&self.angles_deg) {
             rows.push((format!("angle at {name}"), *angle, "deg"));
         }
         rows.push(("twist, sighted along u".into(), self.twist_deg[0], "deg"));

@@ -13,10 +13,11 @@
 //! the same side are not detected. On double curvature the allowed strain hides some errors.
 
 use super::dimension_checks::{Check, ShapeChecks};
-use crate::{Outline, Surface};
+use crate::{Corner, Outline, Surface};
 
-/// Largest error of a cut in the length of an edge, metres.
-const CUT: f64 = 2e-3;
+/// Largest error of a cut in the length of an edge, and largest expanded uncertainty of a corner that counts as seen,
+/// metres.
+pub const CUT_ERROR: f64 = 2e-3;
 
 /// Number of places on a side over which the Gaussian curvature is averaged.
 const PLACES: usize = 8;
@@ -60,17 +61,23 @@ pub fn edge_doubts(checks: &ShapeChecks, surface: &Surface, cut: [f64; 4]) -> Ve
     unexplained(checks.edges.map(|edge| edge.mid), gaussian, size, cut)
 }
 
-/// Returns, per corner, whether it was seen: it was not extrapolated, and neither of its edges is doubtful.
+/// Returns, per corner, whether it was seen: it was not extrapolated, its uncertainty does not exceed the error of a cut,
+/// and neither of its edges is doubtful.
 #[must_use]
 pub fn corners_seen(outline: &Outline, doubts: &[EdgeDoubt]) -> [bool; 4] {
-    std::array::from_fn(|k| outline.corners[k].seen && !doubts.iter().any(|doubt| doubt.has_corner(k)))
+    let is_doubtful = |k: usize| doubts.iter().any(|doubt| doubt.has_corner(k));
+    std::array::from_fn(|k| is_located(&outline.corners[k]) && !is_doubtful(k))
+}
+
+fn is_located(corner: &Corner) -> bool {
+    corner.seen && corner.uncertainty() <= CUT_ERROR
 }
 
 fn unexplained(edges: [Check; 4], gaussian: f64, [w, h]: [f64; 2], cut: [f64; 4]) -> Vec<EdgeDoubt> {
     let doubt = |edge: usize| {
         let (Check { value: length, sigma, .. }, cut) = (edges[edge], cut[edge]);
         let across = if edge.is_multiple_of(2) { h } else { w };
-        let explained = CUT + gaussian.abs() * across * across / 24.0 * cut;
+        let explained = CUT_ERROR + gaussian.abs() * across * across / 24.0 * cut;
         ((length - cut).abs() > explained).then_some(EdgeDoubt { edge, length, sigma, cut })
     };
     (0..4).filter_map(doubt).collect()
@@ -102,6 +109,14 @@ mod tests {
         let edges = [2.982, 2.482, 2.982, 2.482].map(|value| Check { value, sigma: 2e-4, seen: true });
         assert!(unexplained(edges, 0.0, [3.0, 2.5], blank.face_edge_lengths(9e-3)).is_empty());
         assert_eq!(unexplained(edges, 0.0, [3.0, 2.5], blank.edge_lengths()).len(), 4);
+    }
+
+    #[test]
+    fn a_corner_known_worse_than_a_cut_was_not_seen() {
+        let corner = |sigma| Corner { point: crate::Vec3::zeros(), sigma, contrast: [0.0; 2], seen: true };
+        assert!(is_located(&corner([1.01e-3, 1e-4])));
+        assert!(!is_located(&corner([1e-4, 1.03e-3])));
+        assert!(!is_located(&Corner { seen: false, ..corner([1e-4; 2]) }));
     }
 
     #[test]
