@@ -29,8 +29,8 @@ type Vec3 = Vector3<f64>;
 
 /// Factor by which the range of our draws is widened.
 const FACTOR: f64 = 1.15;
-/// Length by which the mean of a sample's markers may lie above that: 0.023 mm is found on the sphere, whose right edge
-/// is 0.27 mm too far out in the sample. Both beams have 13 rays; that of the samples need not have the same weights.
+/// Length by which the mean of a sample's markers may lie above that: 0.023 mm is found on the sphere. Its markers follow
+/// one material law, which "below 0.2 mm is no judge" (README of the samples); its right edge is 0.27 mm too far out.
 const MARKERS_MM: f64 = 0.03;
 /// Scans of each scene by our simulator.
 const SEEDS: u64 = 10;
