@@ -36,7 +36,8 @@ use platen_model::{Figure, Report, Task, Verdict};
 use platen_plant::PlateFile;
 use platen_shape::evaluate::{self, Place};
 use platen_shape::{
-    Blank, CUT_ERROR, Corner, EXPANDED, EdgeDoubt, Measured, RangeError, Scanned, ShapeChecks, Vec3, corners_seen, edge_doubts,
+    Blank, CUT_ERROR, Corner, EXPANDED, EdgeDoubt, Measured, RangeError, Scanned, ShapeChecks, Vec3,
+    corners_seen, edge_doubts,
 };
 
 /// Version of the document.

@@ -56,7 +56,9 @@ pub use extract::{Beyond, Crossing, MixedPixels, Patch, PlaneBehind, PlaneSet, S
 #[cfg(feature = "measure")]
 pub use flatten::{Chart, Flatten, FlattenError};
 #[cfg(feature = "measure")]
-pub use inspection::{BendingEnergy, CUT_ERROR, Check, EdgeCheck, EdgeDoubt, ShapeChecks, corners_seen, edge_doubts};
+pub use inspection::{
+    BendingEnergy, CUT_ERROR, Check, EdgeCheck, EdgeDoubt, ShapeChecks, corners_seen, edge_doubts,
+};
 #[cfg(feature = "measure")]
 pub use measure::{MeasureError, Measured, Measurement, Scanned, measure};
 #[cfg(feature = "measure")]
