@@ -63,7 +63,7 @@ fn systemd_hears_ready_then_the_cycle_then_stopping() {
     while let Ok(n) = socket.recv(&mut bytes) {
         last += std::str::from_utf8(&bytes[..n]).unwrap();
     }
-    assert!(last.contains("STOPPING=1"), "{last}");
+    assert!(last.contains("STOPPING=1\nWATCHDOG_USEC=0\n"), "{last}");
 }
 
 /// Forwarder of a plant, ended with the test.

@@ -3,6 +3,9 @@
 //! The status of the press side changes with each cycle that polls the press. Each change resets the watchdog. If a
 //! cycle hangs, the watchdog is not reset and systemd restarts the host. The mode `off` has no cycle; there a timer
 //! resets the watchdog.
+//!
+//! A host that stops needs no watchdog: systemd limits the time of a stop (`TimeoutStopSec=`). It is switched off with
+//! the notification, as a reset after `SIGTERM` would start it again, and the last scan may take longer than its period.
 
 use std::time::{Duration, Instant};
 
@@ -46,8 +49,8 @@ pub(super) async fn keep(mode: Mode, mut status: watch::Receiver<Status>) {
     }
 }
 
-/// Notifies systemd that the host is stopping.
+/// Notifies systemd that the host is stopping, without a watchdog from now on.
 pub(super) fn stopping() {
     // Fails without systemd, which does not matter.
-    let _ = sd_notify::notify(&[NotifyState::Stopping]);
+    let _ = sd_notify::notify(&[NotifyState::Stopping, NotifyState::WatchdogUsec(0)]);
 }
