@@ -21,6 +21,7 @@ mod fit;
 mod intensity;
 mod near_angle;
 mod occupancy;
+mod places;
 mod restore;
 mod spherical;
 mod survey;

@@ -4,7 +4,7 @@
 //!    ([`crate::orient`]), and the CRC-32C of all ranges. The cells are decoded on a separate thread.
 //! 2. The second pass ([`ScanReader::columns`]) delivers every column once, as soon as the file has completed it.
 //!
-//! Up to 2.6 million cells (107 MB) are kept from the first pass. A larger file is decoded twice, so that the memory is
+//! Up to 3.1 million cells (104 MB) are kept from the first pass. A larger file is decoded twice, so that the memory is
 //! bounded: sums per row and column, one bit per cell, and the columns that are not complete yet.
 
 mod cells;
@@ -75,8 +75,8 @@ pub struct ScanReader<'a> {
     kept: SphericalCells,
 }
 
-/// Largest number of cells that are kept, 107 MB.
-const MAX_KEPT: u64 = 5 << 19;
+/// Largest number of cells that are kept, 104 MB.
+const MAX_KEPT: u64 = 3 << 20;
 /// Number of cells between two reports of progress.
 const PROGRESS_EVERY: u64 = 1 << 16;
 
@@ -139,7 +139,7 @@ impl<'a> ScanReader<'a> {
             checksum = continued_checksum(checksum, &batch.cells.range, &mut bytes);
             fits &= survey.cells() <= MAX_KEPT;
             if fits {
-                kept.append(&batch.cells, 0..batch.cells.len());
+                kept.append(&batch.cells, 0..batch.cells.len(), &batch.cells.places);
             } else {
                 *kept = SphericalCells::default();
             }

@@ -31,7 +31,8 @@ impl NearAngle {
         if across.abs() < NEAR * along {
             let tangent = across / along;
             let square = tangent * tangent;
-            let series = 1.0 - square * (1.0 / 3.0 - square * (0.2 - square * (1.0 / 7.0 - square / 9.0)));
+            let series =
+                1.0 - square * (1.0 / 3.0 - square * (0.2 - square * (1.0 / 7.0 - square * (1.0 / 9.0))));
             return self.angle + tangent * series;
         }
         self.angle = y.atan2(x);

@@ -6,6 +6,7 @@ use std::ops::Range;
 use platen_scan::{Direction, State, wrap_azimuth};
 
 use super::near_angle::NearAngle;
+use super::places::Places;
 use super::{Position, RawCell};
 
 /// Range below which a cell flagged valid is not a measurement, in the file's unit: writers without a flag store
@@ -18,10 +19,8 @@ pub(super) const NO_NUMBER: f64 = 1e12;
 /// Cells as ranges and directions, in the unit and frame of their file and in its order: arrays of one length.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct SphericalCells {
-    /// Row numbers in the file.
-    pub(crate) row: Vec<u32>,
-    /// Column numbers in the file.
-    pub(crate) column: Vec<u32>,
+    /// Rows and columns in the file.
+    pub(crate) places: Places,
     /// Ranges; not finite where the file contains no numbers.
     pub(crate) range: Vec<f64>,
     /// Azimuths, with the elevations below; directions stored in the file are kept to the last bit.
@@ -37,8 +36,7 @@ impl SphericalCells {
     /// Returns an empty set with capacity for `n` cells.
     pub(crate) fn with_capacity(n: usize) -> Self {
         Self {
-            row: Vec::with_capacity(n),
-            column: Vec::with_capacity(n),
+            places: Places::default(),
             range: Vec::with_capacity(n),
             azimuth: Vec::with_capacity(n),
             elevation: Vec::with_capacity(n),
@@ -49,18 +47,23 @@ impl SphericalCells {
 
     /// Returns the number of cells.
     pub(crate) fn len(&self) -> usize {
-        self.row.len()
+        self.places.len()
     }
 
     /// Returns the state of a cell as determined by its numbers.
     pub(super) fn true_state(&self, cell: usize) -> State {
-        if (NO_RANGE..NO_NUMBER).contains(&self.range[cell]) { self.state[cell] } else { State::NoReturn }
+        true_state(self.range[cell], self.state[cell])
     }
 
-    /// Appends some of other cells.
-    pub(crate) fn append(&mut self, other: &Self, some: Range<usize>) {
-        self.row.extend_from_slice(&other.row[some.clone()]);
-        self.column.extend_from_slice(&other.column[some.clone()]);
+    /// Returns the states of some cells as determined by their numbers.
+    pub(super) fn true_states(&self, some: Range<usize>) -> Vec<State> {
+        let stored = self.range[some.clone()].iter().zip(&self.state[some]);
+        stored.map(|(range, state)| true_state(*range, *state)).collect()
+    }
+
+    /// Appends some of other cells, whose places are given.
+    pub(crate) fn append(&mut self, other: &Self, some: Range<usize>, places: &Places) {
+        places.runs().iter().for_each(|run| self.places.append(*run));
         self.range.extend_from_slice(&other.range[some.clone()]);
         self.azimuth.extend_from_slice(&other.azimuth[some.clone()]);
         self.elevation.extend_from_slice(&other.elevation[some.clone()]);
@@ -70,11 +73,15 @@ impl SphericalCells {
 
     /// Removes all cells; keeps their room.
     pub(crate) fn clear(&mut self) {
-        let Self { row, column, range, azimuth, elevation, intensity, state } = self;
-        [row, column].into_iter().for_each(Vec::clear);
+        let Self { places, range, azimuth, elevation, intensity, state } = self;
+        places.clear();
         [range, azimuth, elevation, intensity].into_iter().for_each(Vec::clear);
         state.clear();
     }
+}
+
+fn true_state(range: f64, stored: State) -> State {
+    if (NO_RANGE..NO_NUMBER).contains(&range) { stored } else { State::NoReturn }
 }
 
 /// Cells, and the parts of their directions' unit vectors to the east, to the north and horizontal.
@@ -106,8 +113,7 @@ impl ToSpherical {
         let RawCell { row, column, position, intensity, state } = *cell;
         let (range, direction, parts) = self.convert(position);
         let cells = &mut to.cells;
-        cells.row.push(row);
-        cells.column.push(column);
+        cells.places.push(row, column);
         cells.range.push(range);
         cells.azimuth.push(direction.azimuth);
         cells.elevation.push(direction.elevation);

@@ -341,16 +341,17 @@ impl Fields {
     fn append(&self, values: &Values, to_spherical: &mut ToSpherical, batch: &mut Converted) {
         let n = values.row.len();
         let cells = &mut batch.cells;
-        cells.row.extend(values.row.iter().map(|row| *row as u32));
-        cells.column.extend(values.column.iter().map(|column| *column as u32));
+        cells
+            .places
+            .extend(values.row.iter().zip(&values.column).map(|(row, column)| [*row as u32, *column as u32]));
         cells.intensity.extend_from_slice(&values.intensity);
-        cells.intensity.resize(cells.row.len(), 0.0);
+        cells.intensity.resize(cells.len(), 0.0);
         cells.state.extend(values.state.iter().map(|state| match state {
             0 => State::Valid,
             1 => State::DirectionOnly,
             _ => State::NoReturn,
         }));
-        cells.state.resize(cells.row.len(), State::Valid);
+        cells.state.resize(cells.len(), State::Valid);
         let [a, b, c] = values.position.each_ref().map(|numbers| &numbers[..n]);
         if self.spherical {
             let is_direction = |point: usize| values.state.get(point) == Some(&1);

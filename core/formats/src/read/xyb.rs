@@ -73,7 +73,7 @@ impl<R: Read + Seek + Send> Xyb<R> {
             xyb.order = Order::Hits(steps.clone(), 0);
             let mut lowest = u32::MAX;
             for batch in batches(xyb.cells()?) {
-                lowest = batch?.cells.row.into_iter().fold(lowest, u32::min);
+                lowest = lowest.min(batch?.cells.places.lowest_row());
             }
             xyb.order = Order::Hits(steps, lowest);
             let note = "the file holds hits without row and column: placed by the order of their angles";
