@@ -6,7 +6,7 @@
 //! 1. The first pass (`Survey`) keeps sums per row and per column.
 //! 2. `Survey::decide` fits elevation to the row number and unwrapped azimuth to the column number by weighted least
 //!    squares, also with rows and columns swapped. It requires correlations of 0.99 and returns a `Plan`.
-//! 3. The second pass ([`Columns`]) applies the plan to every cell.
+//! 3. The second pass (`Assembly`) applies the plan to every cell.
 //!
 //! The result has row 0 at the top, columns by increasing azimuth (counter-clockwise seen from above), a right-handed
 //! frame, and metres.
@@ -26,7 +26,7 @@ mod restore;
 mod spherical;
 mod survey;
 
-pub use apply::Columns;
+pub(crate) use apply::Assembly;
 pub(crate) use decide::Plan;
 use decide::Unit;
 pub(crate) use spherical::{Converted, SphericalCells, ToSpherical};

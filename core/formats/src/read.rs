@@ -8,6 +8,7 @@
 //! bounded: sums per row and column, one bit per cell, and the columns that are not complete yet.
 
 mod cells;
+mod columns;
 mod decode_ahead;
 mod detect;
 pub(crate) mod e57;
@@ -26,10 +27,12 @@ use std::path::Path;
 
 use platen_scan::ScanHeader;
 
-use crate::Format;
-use crate::orient::{Columns, Expected, Mirror, Plan, SphericalCells, Survey};
+use crate::format::Format;
+use crate::orient::{Expected, Mirror, Plan, SphericalCells, Survey};
 use cells::Cells;
+use columns::Batches;
 
+pub use columns::Columns;
 pub use error::ReadError;
 use error::Result;
 
@@ -56,9 +59,6 @@ struct About {
     /// One sentence per decision made while opening.
     notes: Vec<String>,
 }
-
-/// Cells in the order of the file. No batch follows an error.
-pub(crate) type Batches<'a> = Box<dyn Iterator<Item = Result<Cow<'a, SphericalCells>>> + 'a>;
 
 /// A lattice in a file; its cells can be read any number of times.
 trait Source: Send {

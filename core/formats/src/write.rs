@@ -21,7 +21,7 @@ use ::e57::E57Writer;
 use platen_scan::{Column, Direction, ScanEnd, ScanHeader, State};
 use tempfile::NamedTempFile;
 
-use crate::Format;
+use crate::format::Format;
 use error::Result;
 pub use error::{WriteError, WriteFault};
 

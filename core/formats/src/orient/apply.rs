@@ -1,9 +1,8 @@
-//! Second pass: columns of the normalised lattice, from the cells in the order of their file.
+//! Columns of the normalised lattice, assembled from the cells in the order of their file.
 //!
 //! A column whose cells are stored in one piece is built at once; the cells of any other column are kept until its last
 //! cell was read.
 
-use std::borrow::Cow;
 use std::f64::consts::PI;
 use std::ops::Range;
 
@@ -11,15 +10,12 @@ use platen_scan::{Column, Face, Outcome, ScanEnd, State, wrap_azimuth};
 
 use super::places::{COLUMN, Cursor, Places, ROW, Run};
 use super::{Mirror, OrientError, Plan, SphericalCells, Unit};
-use crate::read::{Batches, ReadError};
 
-/// Columns of an oriented lattice, each once, as soon as the file has completed it. No column follows an error.
+/// Columns in progress.
 ///
 /// A file stored column by column needs memory for one column, a file stored row by row for all cells.
-pub struct Columns<'a> {
+pub(crate) struct Assembly<'a> {
     plan: &'a Plan,
-    batches: Batches<'a>,
-    batch: Cow<'a, SphericalCells>,
     /// First cell of the batch that was not taken.
     cursor: Cursor,
     /// Places of the cells taken last.
@@ -32,13 +28,10 @@ pub struct Columns<'a> {
     rest: usize,
 }
 
-impl<'a> Columns<'a> {
-    /// Starts the second pass over the cells.
-    pub(crate) fn new(plan: &'a Plan, batches: Batches<'a>) -> Self {
+impl<'a> Assembly<'a> {
+    pub(crate) fn new(plan: &'a Plan) -> Self {
         Self {
             plan,
-            batches,
-            batch: Cow::default(),
             cursor: Cursor::default(),
             places: Places::default(),
             waiting: vec![SphericalCells::default(); plan.cells.len()],
@@ -48,41 +41,46 @@ impl<'a> Columns<'a> {
         }
     }
 
-    /// Returns the share of cells read, 0 to 1.
-    pub fn share(&self) -> f64 {
+    /// Returns the share of cells taken, 0 to 1.
+    pub(crate) fn share(&self) -> f64 {
         self.seen as f64 / self.expected() as f64
     }
 
-    /// Returns the trailer; columns not taken are read and dropped.
-    ///
-    /// # Errors
-    /// As the columns.
-    pub fn finish(&mut self) -> Result<ScanEnd, ReadError> {
-        self.try_for_each(|column| column.map(drop))?;
-        Ok(ScanEnd {
+    /// Returns the trailer.
+    pub(crate) fn end(&self) -> ScanEnd {
+        ScanEnd {
             columns: self.plan.header.n_columns,
             points: self.points,
             warm_up_columns: self.plan.warm_up_columns,
             outcome: Outcome::Complete,
-        })
+        }
     }
 
-    fn next_column(&mut self) -> Result<Option<Column>, ReadError> {
+    /// Takes cells of a batch until they complete a column; `None` when all of them are taken. The next call is for the
+    /// next batch then.
+    ///
+    /// # Errors
+    /// [`OrientError::Changed`].
+    pub(crate) fn next(&mut self, batch: &SphericalCells) -> Result<Option<Column>, OrientError> {
         loop {
-            loop {
-                let some = self.cursor.take(&self.batch.places, self.plan.axes().1, &mut self.places);
-                if some.is_empty() {
-                    break;
-                }
-                if let Some(column) = self.take(some)? {
-                    return Ok(Some(column));
-                }
+            let some = self.cursor.take(&batch.places, self.plan.axes().1, &mut self.places);
+            if some.is_empty() {
+                self.cursor = Cursor::default();
+                return Ok(None);
             }
-            let Some(batch) = self.batches.next() else { break };
-            (self.batch, self.cursor) = (batch?, Cursor::default());
+            if let Some(column) = self.take(batch, some)? {
+                return Ok(Some(column));
+            }
         }
+    }
+
+    /// Returns a column without stored cells, each once; after the last batch.
+    ///
+    /// # Errors
+    /// [`OrientError::Changed`].
+    pub(crate) fn next_empty(&mut self) -> Result<Option<Column>, OrientError> {
         if self.seen != self.expected() || self.waiting.iter().any(|cells| cells.len() > 0) {
-            return Err(self.changed().into());
+            return Err(self.changed());
         }
         let empty = self.plan.cells[self.rest..].iter().position(|cells| *cells == 0);
         Ok(empty.map(|ahead| {
@@ -93,9 +91,9 @@ impl<'a> Columns<'a> {
     }
 
     /// Takes cells of one column; returns it when they complete it.
-    fn take(&mut self, some: Range<usize>) -> Result<Option<Column>, OrientError> {
+    fn take(&mut self, batch: &SphericalCells, some: Range<usize>) -> Result<Option<Column>, OrientError> {
         self.seen += some.len() as u64;
-        let (places, batch) = (&self.places, &self.batch);
+        let places = &self.places;
         let column = self.plan.column(places).ok_or_else(|| self.changed())?;
         let waiting = &mut self.waiting[column as usize];
         let expected = self.plan.cells[column as usize] as usize;
@@ -126,14 +124,6 @@ impl<'a> Columns<'a> {
 
     fn changed(&self) -> OrientError {
         OrientError::Changed { expected: self.expected(), found: self.seen }
-    }
-}
-
-impl Iterator for Columns<'_> {
-    type Item = Result<Column, ReadError>;
-
-    fn next(&mut self) -> Option<Self::Item> {
-        self.next_column().transpose()
     }
 }
 

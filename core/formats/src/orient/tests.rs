@@ -6,7 +6,7 @@ use std::f64::consts::TAU;
 use platen_scan::{Direction, Lattice};
 
 use super::*;
-use crate::ReadError;
+use crate::{Columns, ReadError};
 
 const ROWS: u32 = 30;
 const COLUMNS: u32 = 40;

@@ -8,7 +8,7 @@ use std::io::BufReader;
 use super::error::{ReadError, Result};
 use super::lines::{self, Lines};
 use super::{xyb, xyz};
-use crate::Format;
+use crate::format::Format;
 
 /// Number of bytes from which a format is detected.
 pub(super) const HEAD: u64 = 1 << 14;
