@@ -115,8 +115,17 @@ fn assemble(plan: &Plan, cells: &[RawCell]) -> Result<Lattice, ReadError> {
     let mut columns = Columns::new(plan, Box::new(std::iter::once(Ok(Cow::Owned(cells)))));
     let mut n_columns = 0;
     for column in &mut columns {
-        lattice.push(&column?).unwrap();
+        let column = column?;
+        lattice.push(&column).unwrap();
         n_columns += 1;
+        for row in (0..column.len()).filter(|row| column.state[*row] == State::NoReturn) {
+            let values = [column.range_m[row], column.azimuth[row], column.elevation[row]];
+            assert_eq!(
+                (values, column.intensity[row]),
+                ([0.0; 3], 0),
+                "a cell without direction holds values"
+            );
+        }
     }
     let end = columns.finish()?;
     assert_eq!((n_columns, lattice.n_valid() as u64), (end.columns, end.points));
