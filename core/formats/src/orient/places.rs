@@ -1,4 +1,5 @@
-//! Rows and columns of successive cells, as runs in which both advance by constant steps.
+//! Rows and columns of successive cells: run-length encoding of their differences. In a run both advance by constant
+//! steps.
 //!
 //! A file stored column by column has a run for each column, and one more for each gap. A run takes the memory of
 //! less than three cells' rows and columns, and whether cells lie in one column is known without a comparison for each;
@@ -114,8 +115,8 @@ impl Places {
             match run.n {
                 0 => run = Run::of(place),
                 1 => {
-                    run =
-                        Run { step: std::array::from_fn(|k| difference(place[k], run.first[k])), n: 2, ..run }
+                    run.step = std::array::from_fn(|axis| difference(place[axis], run.first[axis]));
+                    run.n = 2;
                 }
                 _ if place == next => run.n += 1,
                 _ => {
@@ -123,7 +124,7 @@ impl Places {
                     run = Run::of(place);
                 }
             }
-            next = std::array::from_fn(|k| sum(place[k], run.step[k]));
+            next = std::array::from_fn(|axis| sum(place[axis], run.step[axis]));
             n += 1;
         }
         self.n += n;
@@ -134,14 +135,13 @@ impl Places {
     pub(super) fn append(&mut self, run: Run) {
         let continued = |last: &&mut Run| last.n > 1 && last.step == run.step && last.at(last.n) == run.first;
         if run.n == 1 {
-            self.extend(run.places());
-        } else if let Some(last) = self.runs.last_mut().filter(continued) {
-            last.n += run.n;
-            self.n += run.len();
-        } else {
-            self.runs.push(run);
-            self.n += run.len();
+            return self.extend(run.places());
         }
+        match self.runs.last_mut().filter(continued) {
+            Some(last) => last.n += run.n,
+            None => self.runs.push(run),
+        }
+        self.n += run.len();
     }
 
     /// Removes all cells; keeps their room.

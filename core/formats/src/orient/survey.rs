@@ -43,10 +43,9 @@ impl Survey {
     /// [`OrientError::IndexOutOfRange`], [`OrientError::DuplicateCell`] or [`OrientError::TooSparse`].
     pub(crate) fn add(&mut self, converted: &Converted) -> Result<(), OrientError> {
         let Converted { cells, parts } = converted;
-        let runs = || cells.places.runs().iter().flat_map(|run| run.by_line(COLUMN));
-        runs().try_for_each(|run| self.add_places(run))?;
         let mut cell = 0;
-        for run in runs() {
+        for run in cells.places.runs().iter().flat_map(|run| run.by_line(COLUMN)) {
+            self.add_places(run)?;
             // The sums of a column stay in registers; for speed only: `tests::speed`.
             let mut column = self.columns[run.line(COLUMN) as usize];
             for [row, _] in run.places() {
