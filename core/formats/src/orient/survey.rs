@@ -46,8 +46,7 @@ impl Survey {
         let mut cell = 0;
         for run in cells.places.runs().iter().flat_map(|run| run.by_line(COLUMN)) {
             self.add_places(run)?;
-            // The sums of a column stay in registers; for speed only: `tests::speed`.
-            let mut column = self.columns[run.line(COLUMN) as usize];
+            let column = &mut self.columns[run.line(COLUMN) as usize];
             for [row, _] in run.places() {
                 let (range, elevation) = (cells.range[cell], cells.elevation[cell]);
                 if cells.true_state(cell) == State::Valid {
@@ -65,7 +64,6 @@ impl Survey {
                 }
                 cell += 1;
             }
-            self.columns[run.line(COLUMN) as usize] = column;
         }
         Ok(())
     }
